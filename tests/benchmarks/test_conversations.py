@@ -412,7 +412,7 @@ def test_a_key_that_is_repeated_is_nowhere(tmp_path: Path, monkeypatch: Any) -> 
             for what in ("usd", "tokens", "minutes")
             for given in ("0", "-1", "nan", "inf")
         ),
-        (("--agent", "oracle", "--max-usd", "0"), "--max-usd is for vision-language agents"),
+        (("--agent", "oracle", "--max-usd", "1"), "--max-usd is for vision-language agents"),
         (("--agent", "openai:m", "--set", "prices.prompt=.nan"), "'prices.prompt'"),
         (("--agent", "openai:m", "--set", "prices.prompt=.inf"), "'prices.prompt'"),
         (("--agent", "openai:m", "--set", "prices.completion=-1"), "'prices.completion'"),

@@ -234,7 +234,7 @@ REFUSED = {
     "fine-tuning": ("stages.reflection.finetune=x", "3-reflection/finetune: there is no"),
     "override": ("stages.exploration.set=[stage=x]", "2-exploration/finetune: "),
     "dialect": ("dialect=x", "base/new-model: there is no dialect 'x'"),
-    "play": ("play=[sampling.heat=2]", "evaluations/1-imitation: the agent has a wrong field"),
+    "play": ("play=[sampling.heat=2]", "evaluations/1-imitation: --set sampling.heat=2: the agent"),
     "skipped tasks": (
         "stages.exploration.sample.skip=10000",
         "2-exploration/sample: mini has 132 tasks; skip fewer than 10000",

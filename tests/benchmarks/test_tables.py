@@ -241,7 +241,7 @@ def test_task_counts(monkeypatch: pytest.MonkeyPatch) -> None:
         ("FloorPlan301", "2"),
     ]
     by_type = dict(zip(scenes.head, scenes.rows[1], strict=True))
-    assert (by_type["SingleSearch"], by_type["SingleToggle"]) == ("2", "0")
+    assert (by_type["Exposed Object Search"], by_type["Exposed Object Toggle"]) == ("2", "0")
     assert sum(int(row[1]) for row in splits.rows) == 4
     assert dropped.rows == (("often", "3"), ("rare", "1"))
     found.clear()

@@ -208,7 +208,7 @@ def test_views_are_of_what_is_seen_and_not_held_the_nearest_first() -> None:
 def test_features_count_the_objects_of_a_type_up_to_ten() -> None:
     for count in (1, 3, 12):
         perception = perception_of(*(make_entry(f"Mug|{n}") for n in range(count)))
-        features = object_features(perception)
+        features = object_features(perception.object_views)
         assert features[KIND_OF["Mug"], 0] == pytest.approx(min(count / 10, 1))
         assert features[:, 0].sum() == features[KIND_OF["Mug"], 0]
 

@@ -139,7 +139,7 @@ SLOW: Mapping[str, tuple[str, ...]] = {
     ),
     "trains for two minutes, or plays what was trained": (
         "README.md: er-gym train-rl",
-        "README.md: er-gym bench --suite er-1k --agent rl:",
+        "README.md: er-gym bench --suite er-1k --types single_search --agent rl:",
         "docs/learning.md: er-gym",
     ),
     "is a file, which tests/test_extending.py imports with the others": (
