@@ -115,6 +115,13 @@ def test_more_steps_continue_a_run_and_a_complete_run_does_nothing(
     assert [line["steps"] for line in read_curve(run)] == [256, 512, 768, 1024]
 
 
+def test_another_kind_of_folder_is_left_alone(make_config: Make, tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text("{}")
+    with pytest.raises(RunConflict, match=r"is a run \(it holds run\.json\); choose another --out"):
+        train(make_config(), tmp_path)
+    assert [each.name for each in tmp_path.iterdir()] == ["run.json"]
+
+
 def test_another_configuration_is_refused(make_config: Make, tmp_path: Path) -> None:
     run = tmp_path / "run"
     train(make_config(), run)
