@@ -23,7 +23,8 @@ _DATA = {*_ROLLOUT, "er_gym.data"}
 _AGENTS = {*_DATA, "agents"}
 _SCORING = {*_DATA, "benchmarks.scoring", "benchmarks.terminal"}
 _COMMAND = {*_AGENTS, *_SCORING, "benchmarks", "benchmarks.cli"}
-_SCRIPTS = {*_COMMAND, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "benchmarks.pages"}
+_HARNESS = {*_COMMAND, "benchmarks.harness"}
+_SCRIPTS = {*_HARNESS, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "benchmarks.pages"}
 ALLOWED = {
     "er_gym.plugins": {"er_gym.plugins"},
     "er_gym.activity": set(),
@@ -42,6 +43,7 @@ ALLOWED = {
     "benchmarks.terminal": {*_ENVS, "benchmarks.terminal"},
     "benchmarks.cli": _COMMAND,
     "benchmarks": _COMMAND,
+    "benchmarks.harness": _HARNESS,
     # Scripts that measure or check look at the engine itself.
     "benchmarks.perf": _SCRIPTS,
     "benchmarks.checks": _SCRIPTS,

@@ -14,7 +14,6 @@ import json
 import math
 import random
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -22,7 +21,8 @@ from typing import Any
 
 import click
 
-from benchmarks.checks.ray_nodes import RayNodes, kill, ray_nodes
+from benchmarks.checks.ray_nodes import RayNodes, ray_nodes
+from benchmarks.harness.processes import ER_GYM, kill
 
 _TIMES = ("seconds",)
 
@@ -73,8 +73,7 @@ def _on(play: list[str], out: Path, nodes: RayNodes) -> list[str]:
 
 
 def _er_gym(arguments: list[str]) -> None:
-    command = [sys.executable, "-m", "benchmarks.cli", *arguments]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([*ER_GYM, *arguments], check=True, stdout=subprocess.DEVNULL)
 
 
 def play_and_kill(
@@ -106,7 +105,7 @@ def play_and_kill(
         for _ in range(kills)
     ]
     killed = {"workers": 0, "nodes": 0}
-    command = [sys.executable, "-m", "benchmarks.cli", *_on(play, out, nodes)]
+    command = [*ER_GYM, *_on(play, out, nodes)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
         for more, kind in plan:
             if not _played(process, out, more):

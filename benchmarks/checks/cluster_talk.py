@@ -10,69 +10,44 @@ within its budget, but for requests that were under way.
 
 from __future__ import annotations
 
-import hashlib
 import json
-import random
 import subprocess
-import sys
 import tempfile
-import threading
 import time
-from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import click
 
 from benchmarks.checks.cluster_kills import episodes_of
 from benchmarks.checks.ray_nodes import RayNodes, ray_nodes
-from benchmarks.perf.conversations import Handler, KeyActionReplies, Server
+from benchmarks.harness.chat_server import (
+    TOKENS,
+    ChatServer,
+    Exchange,
+    Messages,
+    drawn,
+    error,
+    key_actions,
+    replies,
+)
+from benchmarks.harness.processes import ER_GYM
 from er_gym.rollout.run_directory import SPENDING
 from er_gym.tasks import load_suite
 
 _CONCURRENCY = 16
-_TOKENS = 120
-"""What the server says that each reply takes."""
 
 
-class TroubledServer(Server):
-    """Replies with key actions, and misbehaves on a fifth of the requests."""
-
-    def __init__(self, replies: KeyActionReplies, seed: int) -> None:
-        super().__init__(replies, latency=0.05, handler=_TroubledHandler)
-        self.draw = random.Random(seed)
-        self.lock = threading.Lock()
-        self.answered: Counter[str] = Counter()
-        self.troubles: Counter[str] = Counter()
-
-
-class _TroubledHandler(Handler):
-    server: TroubledServer
-
-    def do_POST(self) -> None:
-        with self.server.lock:
-            trouble = self.server.draw.choices(
-                ("", "error", "hang-up", "wait", "late"), (80, 5, 5, 5, 5)
-            )[0]
-            self.server.troubles[trouble or "none"] += 1
-        if trouble == "hang-up":
-            self.close_connection = True
-            self.rfile.read(int(self.headers["Content-Length"]))
-            self.connection.close()
-        elif trouble in ("error", "wait"):
-            self.rfile.read(int(self.headers["Content-Length"]))
-            self.send_response(500 if trouble == "error" else 429)
-            self.send_header("Retry-After", "0.2")
-            self.send_header("Content-Length", "0")
-            self.end_headers()
-        else:
-            time.sleep(1.0 if trouble == "late" else 0.0)
-            super().do_POST()
-
-    def answered(self, asked: dict[str, Any]) -> None:
-        told = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()
-        with self.server.lock:
-            self.server.answered[told] += 1
+def troubled(say: Callable[[Messages], str], seed: int) -> ChatServer:
+    """Replies with these words, and misbehaves on a fifth of the requests."""
+    faults = {
+        "none": (80, replies(say, latency=0.05, keep=True)),
+        "error": (5, error(500, Retry_After="0.2")),
+        "hang-up": (5, Exchange.raw),
+        "wait": (5, error(429, Retry_After="0.2")),
+        "late": (5, replies(say, latency=1.05, keep=True)),
+    }
+    return ChatServer(drawn(faults, seed))
 
 
 @click.command()
@@ -82,11 +57,10 @@ def main(episodes: int, seed: int) -> None:
     """Play, kill, check."""
     every = {task.instruction: task for task in load_suite("er-1k").tasks}
     tasks = list(every.values())[:episodes]
-    server = TroubledServer(KeyActionReplies(tasks), seed)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    with tempfile.TemporaryDirectory() as scratch, ray_nodes(2) as nodes:
+    server = troubled(key_actions(tasks), seed)
+    with tempfile.TemporaryDirectory() as scratch, ray_nodes(2) as nodes, server:
         out = Path(scratch) / "run"
-        budget = 2 * _TOKENS * episodes
+        budget = 2 * TOKENS * episodes
         ids = ",".join(task.id for task in tasks)
         play = ["bench", "--suite", "er-1k", "--task-ids", ids, "--agent", "openai:troubled"]
         play += ["--base-url", server.url, "--out", str(out), "--concurrency", str(_CONCURRENCY)]
@@ -95,23 +69,22 @@ def main(episodes: int, seed: int) -> None:
         spent = _tokens(out)
         second = _er_gym(play, nodes, kill=False)
         found = episodes_of(out)
-        twice = sum(count > 1 for count in server.answered.values())
+        twice = server.repeated
         crashed = sum(bool(each["error"]) for each in found.values())
         print(
             f"exit codes {first} and {second}; {spent:,} of {budget:,} tokens spent at first; "
             f"{len(found)} of {episodes} episodes, {crashed} crashed; "
             f"{server.answered.total()} replies, {twice} requests answered twice, "
-            f"{_tokens(out):,} tokens in the ledger; {dict(server.troubles)}"
+            f"{_tokens(out):,} tokens in the ledger; {dict(server.drawn)}"
         )
-        most = budget + _CONCURRENCY * _TOKENS
+        most = budget + _CONCURRENCY * TOKENS
         good = len(found) == episodes and not crashed and not twice and spent <= most
-        good &= (first, second) == (3, 0) and _tokens(out) == _TOKENS * server.answered.total()
+        good &= (first, second) == (3, 0) and _tokens(out) == TOKENS * server.answered.total()
     raise SystemExit(0 if good else 1)
 
 
 def _er_gym(arguments: list[str], nodes: RayNodes, kill: bool) -> int:
-    command = [sys.executable, "-m", "benchmarks.cli", *arguments]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+    with subprocess.Popen([*ER_GYM, *arguments], stdout=subprocess.DEVNULL) as process:
         while kill and process.poll() is None:
             time.sleep(1.0)
             if len(nodes.workers()) == 2:

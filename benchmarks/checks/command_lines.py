@@ -18,7 +18,6 @@ import os
 import re
 import resource
 import shutil
-import signal
 import socket
 import stat
 import sys
@@ -33,8 +32,10 @@ from typing import NoReturn
 import benchmarks.cli.vlm_run  # noqa: F401  # imported once, not in each fork
 from benchmarks.checks.bad_commands import Line, lines
 from benchmarks.checks.bad_files import make
-from benchmarks.checks.tally import Tally
 from benchmarks.cli.main import main as er_gym
+from benchmarks.harness.output import ROOT
+from benchmarks.harness.processes import ER_GYM, kill, members
+from benchmarks.harness.tally import Tally, Try, holds, run_check, tally
 
 _AT_ONCE = 2
 _REAL_EVERY = 10
@@ -50,45 +51,28 @@ _RAW = re.compile(b"[\x00-\x08\x0b-\x1f\x7f]|\xc2[\x80-\x9f]|\xe2\x80[\xa8-\xae]
 """Terminal control characters in UTF-8, except tab and newline."""
 _SAYS_WHY = re.compile(r"(loading [^\n]+\n)*er-gym: ")
 """How stderr begins if it says why: outside a terminal, imports that take long are told first."""
-_ROOT = Path(__file__).resolve().parents[2]
-
-
-def main(words: Sequence[str]) -> int:
-    """Try all lines; print the failures and their number."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
-    tally = check(words)
-    print(tally)
-    return int(tally.short > 0)
 
 
 def check(words: Sequence[str], *, at_least: int | None = None) -> Tally:
     """Try all lines that hold the words, or a number of lines of every kind, and print the
     failures.
     """
-    chosen = [line for line in lines() if all(word in str(line) for word in words)]
-    if at_least is not None:
-        chosen = _choice(chosen, at_least)
-    began, short = time.monotonic(), 0
-    with (
-        tempfile.TemporaryDirectory() as directory,
-        _taken_port() as port,
-        contextlib.ExitStack() as stack,
-    ):
+    chosen = [line for line in lines() if holds(str(line), words)]
+    return tally("command lines", _tries(chosen if at_least is None else _choice(chosen, at_least)))
+
+
+def _tries(chosen: Sequence[Line]) -> Iterator[Try]:
+    with tempfile.TemporaryDirectory() as directory, _taken_port() as port:
         top = Path(directory)
         make(top / "files")
         before = _state(top / "files")
-        ends = stack.enter_context(contextlib.closing(_ends(chosen, top, port)))
-        for ended in ends:
-            problems = [*_problems(ended)]
-            now = _state(top / "files")
-            if now != before:
-                problems.append(f"changed files: {sorted(now ^ before)[:3]}")
+        with contextlib.closing(_ends(chosen, top, port)) as ends:
+            for ended in ends:
+                now = _state(top / "files")
+                changed = [f"changed files: {sorted(now ^ before)[:3]}"] if now != before else []
                 before = now
-            short += bool(problems)
-            for problem in problems:
-                print(f"er-gym {str(ended.line)!r}: {problem}", flush=True)
-            shutil.rmtree(ended.folder, ignore_errors=True)
-    return Tally("command lines", len(chosen), short, time.monotonic() - began)
+                yield f"er-gym {str(ended.line)!r}", (*_problems(ended), *changed)
+                shutil.rmtree(ended.folder, ignore_errors=True)
 
 
 def _choice(every: Sequence[Line], at_least: int) -> list[Line]:
@@ -141,12 +125,10 @@ def _ends(chosen: Sequence[Line], top: Path, port: int) -> Generator[_Ended, Non
         yield from _ends_of(list(enumerate(chosen))[::-1], running, top, port)
     finally:  # Ctrl-C too
         for pid in running:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGKILL)
+            kill(pid)
             os.waitpid(pid, 0)
-            for member in _session(pid):
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(member, signal.SIGKILL)
+            for member, _ in members(pid):
+                kill(member)
 
 
 def _ends_of(
@@ -173,7 +155,7 @@ def _ends_of(
         for pid, (line, folder, start) in list(running.items()):
             seconds = time.monotonic() - start
             if seconds > _SECONDS:
-                os.kill(pid, signal.SIGKILL)
+                kill(pid)
             done, status, used = os.wait4(pid, 0 if seconds > _SECONDS else os.WNOHANG)
             if done:
                 del running[pid]
@@ -186,26 +168,13 @@ def _ends_of(
 def _left_behind(pid: int) -> bool:
     """Kill the remaining processes of a command's session; returns whether there were any."""
     end = time.monotonic() + _GRACE
-    while members := _session(pid):
+    while left := [*members(pid)]:
         if time.monotonic() > end:
-            for member in members:
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(member, signal.SIGKILL)
+            for member, _ in left:
+                kill(member)
             return True
         time.sleep(0.02)
     return False
-
-
-def _session(leader: int) -> list[int]:
-    """The running processes of a session, without zombies."""
-    found = []
-    for file in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):
-            pid, _, rest = file.read_text().partition(" (")
-            state, _, _, session, *_ = rest.rpartition(") ")[2].split()
-            if int(session) == leader and state not in "ZX":
-                found.append(int(pid))
-    return found
 
 
 def _run(line: Line, folder: Path, port: int, real: bool) -> NoReturn:
@@ -226,7 +195,7 @@ def _run(line: Line, folder: Path, port: int, real: bool) -> NoReturn:
         os.environ |= {
             "HOME": str(folder / "home"),
             "TMPDIR": str(folder / "tmp"),
-            "PYTHONPATH": f"{_ROOT}:{folder / 'files'}",
+            "PYTHONPATH": f"{ROOT}:{folder / 'files'}",
             "COLUMNS": "200",
         }
         for name in ("OPENAI_API_KEY", "ER_GYM_HOME", "XDG_DATA_HOME"):
@@ -235,7 +204,7 @@ def _run(line: Line, folder: Path, port: int, real: bool) -> NoReturn:
         resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 28, 1 << 28))
         words = [word.replace("{port}", str(port)) for word in line.words]
         if real:
-            os.execv(sys.executable, [sys.executable, "-m", "benchmarks.cli", *words])
+            os.execv(sys.executable, [*ER_GYM, *words])
         sys.path.insert(0, str(folder / "files"))
         try:
             er_gym(words)
@@ -306,4 +275,4 @@ def _state(folder: Path) -> set[tuple[str, int, int]]:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    run_check(check, __doc__)

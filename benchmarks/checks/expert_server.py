@@ -25,10 +25,10 @@ import click
 from click.testing import CliRunner
 
 from agents.expert.thought_kinds import load_thought_kinds
-from benchmarks.checks.faulty_server import FaultyServer
-from benchmarks.checks.output import Output, write_figures
 from benchmarks.checks.scripted_expert import scripted_expert
 from benchmarks.cli.main import cli
+from benchmarks.harness.chat_server import ChatServer
+from benchmarks.harness.output import json_option, write_figures
 from er_gym.data.collection import Collection
 from er_gym.data.critic import check
 from er_gym.data.knowledge import knowledge_at
@@ -125,7 +125,7 @@ def collect_with_faults(
 
 
 def _stops_at_the_budget(
-    command: list[str], out: Path, server: FaultyServer, budget: float
+    command: list[str], out: Path, server: ChatServer, budget: float
 ) -> Iterator[str]:
     limited = [*command, "--max-usd", str(budget)]
     result = CliRunner().invoke(cli, limited, standalone_mode=False)
@@ -182,7 +182,7 @@ def _ledger(out: Path) -> list[dict[str, Any]]:
 @click.command()
 @click.option("--suite", default="mini", show_default=True)
 @click.option("--limit", default=200, show_default=True)
-@click.option("--json", "file", type=Output(), help="Also write the figures to this file.")
+@json_option
 def main(suite: str, limit: int, file: Path | None) -> int:
     """Collect, and print what is wrong."""
     with tempfile.TemporaryDirectory() as directory:
@@ -194,8 +194,7 @@ def main(suite: str, limit: int, file: Path | None) -> int:
         click.echo(problem)
     figures = {name: value for name, value in vars(outcome).items() if name != "problems"}
     click.echo(json.dumps(figures, indent=1))
-    if file is not None:
-        write_figures(file, figures)
+    write_figures(file, figures)
     return int(bool(outcome.problems))
 
 

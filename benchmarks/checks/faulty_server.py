@@ -1,110 +1,34 @@
-"""A server of chat completions that fails in a hundred ways, over real HTTP on the loopback."""
+"""Faults of a server of chat completions: a hundred ways in which it fails."""
 
 from __future__ import annotations
 
-import contextlib
 import gzip
 import json
 import socket
 import struct
-import threading
 import time
 import zlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from email.utils import formatdate
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 from benchmarks.checks.refusals import REFUSALS, Refused
+from benchmarks.harness.chat_server import (
+    DELETE,
+    GOOD,
+    SAID,
+    Exchange,
+    Fault,
+    body,
+    completion,
+    error,
+    head,
+    ok,
+)
 
-SAID = "<DecisionMaking>end</DecisionMaking>"
 KEY = "sk-check-0a1b2c3d4e5f6a7b"
-DELETE = object()
 _DEEP = 100_000
 _PROBE = b"Say OK."
-
-
-class Exchange(BaseHTTPRequestHandler):
-    """One request, which a fault answers as it likes."""
-
-    protocol_version = "HTTP/1.1"
-    faulty: FaultyServer
-    body: bytes
-
-    def do_POST(self) -> None:
-        self.body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
-        with self.faulty.lock:
-            self.faulty.count += 1
-            number = self.faulty.count
-        good = number <= self.faulty.good_first
-        with contextlib.suppress(OSError):
-            (_ok if good else self.faulty.fault)(self)
-
-    def raw(self, *pieces: bytes, pause: float = 0.0) -> None:
-        """Send bytes as they are, and hang up."""
-        self.close_connection = True
-        for piece in pieces:
-            self.connection.sendall(piece)
-            if pause and self.faulty.closing.wait(pause):
-                return
-
-    def hang(self) -> None:
-        """Send nothing more until the server closes."""
-        self.faulty.closing.wait(600)
-        self.close_connection = True
-
-    def send(
-        self, body: bytes, status: int = 200, headers: Mapping[str, str] | None = None
-    ) -> None:
-        """An answer."""
-        if 200 <= status < 300:
-            with self.faulty.lock:
-                self.faulty.accepted += 1
-        self.raw(head(len(body), status, headers) + body)
-
-    def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing."""
-
-
-def head(length: int | None, status: int = 200, headers: Mapping[str, str] | None = None) -> bytes:
-    """The head of an answer."""
-    given = {"Content-Type": "application/json", "Connection": "close", **(headers or {})}
-    if length is not None:
-        given["Content-Length"] = str(length)
-    lines = "".join(f"{name}: {value}\r\n" for name, value in given.items())
-    return f"HTTP/1.1 {status} Whatever\r\n{lines}\r\n".encode()
-
-
-def completion(**changed: Any) -> dict[str, Any]:
-    """A good answer, with changes by path: ``choices__0__message__content=1``."""
-    answer: Any = {
-        "id": "1",
-        "object": "chat.completion",
-        "created": 0,
-        "model": "faulty",
-        "choices": [
-            {
-                "index": 0,
-                "message": {"role": "assistant", "content": SAID},
-                "finish_reason": "stop",
-            }
-        ],
-        "usage": {"prompt_tokens": 50, "completion_tokens": 9, "total_tokens": 59},
-    }
-    for path, value in changed.items():
-        place = answer
-        *way, last = [int(name) if name.isdecimal() else name for name in path.split("__")]
-        for name in way:
-            place = place[name] if isinstance(name, int) else place.setdefault(name, {})
-        if value is DELETE:
-            del place[last]
-        else:
-            place[last] = value
-    return dict(answer)
-
-
-Fault = Callable[[Exchange], None]
 
 
 def says(**changed: Any) -> Fault:
@@ -118,33 +42,15 @@ def usage(**counts: Any) -> Fault:
     return says(usage=counts)
 
 
-def body(
-    content: bytes, status: int = 200, more: Mapping[str, str] | None = None, **headers: str
-) -> Fault:
-    """An answer of these bytes; ``_`` stands for ``-`` in a header's name."""
-    named = {name.replace("_", "-"): value for name, value in headers.items()} | dict(more or {})
-    return lambda exchange: exchange.send(content, status, named)
-
-
-def error(status: int, message: str = "no", **headers: str) -> Fault:
-    """An error in OpenAI's form."""
-    named = {name.replace("_", "-"): value for name, value in headers.items()}
-    return body(json.dumps({"error": {"message": message}}).encode(), status, named)
-
-
-_GOOD = json.dumps(completion()).encode()
-_ok = body(_GOOD)
-
-
 def refuses(refused: Refused) -> Fault:
     """Refuses every conversation but the short one that asks whether the server is there."""
     content = json.dumps(refused.body).encode()
 
     def fault(exchange: Exchange) -> None:
         if _PROBE in exchange.body:
-            with exchange.faulty.lock:
-                exchange.faulty.probed += 1
-            _ok(exchange)
+            with exchange.chat_server.lock:
+                exchange.chat_server.probed += 1
+            ok(exchange)
         else:
             exchange.send(content, refused.status)
 
@@ -158,23 +64,23 @@ def _reset(exchange: Exchange) -> None:
 
 
 def _hang_after_head(exchange: Exchange) -> None:
-    exchange.connection.sendall(head(len(_GOOD)))
+    exchange.connection.sendall(head(len(GOOD)))
     exchange.hang()
 
 
 def _hang_in_body(exchange: Exchange) -> None:
-    exchange.connection.sendall(head(len(_GOOD)) + _GOOD[:40])
+    exchange.connection.sendall(head(len(GOOD)) + GOOD[:40])
     exchange.hang()
 
 
 def _chunks_without_end(exchange: Exchange) -> None:
     exchange.connection.sendall(head(None, headers={"Transfer-Encoding": "chunked"}))
-    while not exchange.faulty.closing.wait(0.01):
+    while not exchange.chat_server.closing.wait(0.01):
         exchange.connection.sendall(b"1\r\nx\r\n")
 
 
 def _continues(exchange: Exchange) -> None:
-    while not exchange.faulty.closing.wait(0.02):
+    while not exchange.chat_server.closing.wait(0.02):
         exchange.connection.sendall(b"HTTP/1.1 100 Continue\r\n\r\n")
 
 
@@ -218,14 +124,14 @@ CASES: list[Case] = [
     Case("hangs after the head", _hang_after_head, _NONE),
     Case("hangs in the body", _hang_in_body, _NONE),
     Case("drips the head", lambda x: x.raw(*_bytes(head(9)), pause=0.1), _NONE),
-    Case("drips the body", lambda x: x.raw(head(len(_GOOD)), *_bytes(_GOOD), pause=0.1), _NONE),
+    Case("drips the body", lambda x: x.raw(head(len(GOOD)), *_bytes(GOOD), pause=0.1), _NONE),
     Case("sends chunks without end", _chunks_without_end, _NONE),
     Case("sends 100 Continue without end", _continues, _NONE),
     Case("hangs up", lambda x: x.raw(), _NONE),
     Case("resets the connection", _reset, _NONE),
     Case("hangs up in the head", lambda x: x.raw(b"HTTP/1.1 200 OK\r\nContent-"), _NONE),
-    Case("hangs up in the body", lambda x: x.raw(head(900), _GOOD[:20]), _NONE),
-    Case("promises more than comes", lambda x: x.raw(head(len(_GOOD) + 9) + _GOOD), _NONE),
+    Case("hangs up in the body", lambda x: x.raw(head(900), GOOD[:20]), _NONE),
+    Case("promises more than comes", lambda x: x.raw(head(len(GOOD) + 9) + GOOD), _NONE),
     # not HTTP
     Case("does not speak HTTP", lambda x: x.raw(b"220 mail ready\r\n"), _NONE),
     Case("sends zeros", lambda x: x.raw(bytes(5000)), _NONE),
@@ -238,26 +144,26 @@ CASES: list[Case] = [
     Case("sends nothing", body(b""), _NONE),
     Case("answers 204", lambda x: x.raw(head(None, 204)), _NONE),
     Case("sends HTML", body(b"<html>Welcome</html>", Content_Type="text/html"), _NONE),
-    Case("sends good JSON as HTML", body(_GOOD, Content_Type="text/html"), _REPLY),
-    Case("sends good JSON as a picture", body(_GOOD, Content_Type="image/png"), _REPLY),
-    Case("sends half of the body", body(_GOOD[: len(_GOOD) // 2]), _NONE),
-    Case("sends the body twice", body(_GOOD * 2), _NONE),
-    Case("sends events", body(b"data: " + _GOOD + b"\n\ndata: [DONE]\n\n"), _NONE),
-    Case("sends half a character", body(_GOOD.replace(b"end", rb"\ud800")), _NONE | _REPLY),
-    Case("sends wrong UTF-8", body(_GOOD.replace(b"end", b"\xff\xfe")), _NONE),
-    Case("sends UTF-16", body(_GOOD.decode().encode("utf-16")), _NONE),
+    Case("sends good JSON as HTML", body(GOOD, Content_Type="text/html"), _REPLY),
+    Case("sends good JSON as a picture", body(GOOD, Content_Type="image/png"), _REPLY),
+    Case("sends half of the body", body(GOOD[: len(GOOD) // 2]), _NONE),
+    Case("sends the body twice", body(GOOD * 2), _NONE),
+    Case("sends events", body(b"data: " + GOOD + b"\n\ndata: [DONE]\n\n"), _NONE),
+    Case("sends half a character", body(GOOD.replace(b"end", rb"\ud800")), _NONE | _REPLY),
+    Case("sends wrong UTF-8", body(GOOD.replace(b"end", b"\xff\xfe")), _NONE),
+    Case("sends UTF-16", body(GOOD.decode().encode("utf-16")), _NONE),
     Case("nests deeply", body(b"[" * _DEEP + b"]" * _DEEP), _NONE),
-    Case("nests a usage deeply", body(_GOOD.replace(b"50", b"[" * _DEEP + b"]" * _DEEP)), _NONE | _REPLY),
+    Case("nests a usage deeply", body(GOOD.replace(b"50", b"[" * _DEEP + b"]" * _DEEP)), _NONE | _REPLY),
     Case("sends null", body(b"null"), _NONE),
     Case("sends a list", body(b"[1]"), _NONE),
-    Case("sends a long number", body(_GOOD.replace(b"50", b"9" * 9000)), _NONE | _REPLY),
+    Case("sends a long number", body(GOOD.replace(b"50", b"9" * 9000)), _NONE | _REPLY),
     Case("sends 30 MB", lambda x: x.send(b" " * 30_000_000), _NONE),
     # encodings
-    Case("compresses", body(gzip.compress(_GOOD), Content_Encoding="gzip"), _REPLY),
-    Case("cuts gzip", body(gzip.compress(_GOOD)[:-20], Content_Encoding="gzip"), _NONE),
-    Case("sends gzip that is not gzip", body(_GOOD, Content_Encoding="gzip"), _NONE),
+    Case("compresses", body(gzip.compress(GOOD), Content_Encoding="gzip"), _REPLY),
+    Case("cuts gzip", body(gzip.compress(GOOD)[:-20], Content_Encoding="gzip"), _NONE),
+    Case("sends gzip that is not gzip", body(GOOD, Content_Encoding="gzip"), _NONE),
     Case("sends a decompression bomb", body(_bomb(), Content_Encoding="gzip"), _NONE),
-    Case("sends an unknown encoding", body(_GOOD, Content_Encoding="rot13"), _NONE),
+    Case("sends an unknown encoding", body(GOOD, Content_Encoding="rot13"), _NONE),
     # wrong types
     *(
         Case(f"sends choices {value!r}", says(choices=value), _NONE)
@@ -323,7 +229,7 @@ CASES: list[Case] = [
     Case("repeats the key in a reply", says(choices__0__message__content=f"{SAID} {KEY}", model=KEY), _REPLY),
     Case("repeats the key in its thoughts", says(choices__0__message__reasoning=KEY, choices__0__finish_reason=KEY), _REPLY),
     Case("repeats the key in a call", says(choices__0__message__tool_calls=[{"function": {"arguments": json.dumps({"action": KEY})}}]), _REPLY),
-    Case("repeats the key in a header", body(_GOOD, X_Request_Id=KEY, more={KEY: "x"}), _REPLY),
+    Case("repeats the key in a header", body(GOOD, X_Request_Id=KEY, more={KEY: "x"}), _REPLY),
     Case("repeats the key in the status line", lambda x: x.raw(f"HTTP/1.1 500 {KEY}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n".encode()), _NONE),
     Case("repeats the key outside of "
     "HTTP", lambda x: x.raw(f"{KEY}: what?\r\n\r\n".encode()), _NONE),
@@ -340,46 +246,3 @@ CASES: list[Case] = [
 
 def _bytes(data: bytes) -> list[bytes]:
     return [data[place : place + 1] for place in range(len(data))]
-
-
-class _Listener(ThreadingHTTPServer):
-    daemon_threads = True
-    block_on_close = False
-    request_queue_size = 64
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """Do not report clients that hang up."""
-
-
-@dataclass
-class FaultyServer:
-    """Serves one fault; use it as a context manager.
-
-    Attributes:
-        good_first: how many requests get a good answer first.
-        count: the requests that came.
-        accepted: the whole answers of status 2xx that were sent.
-        probed: how many of them answered a question whether the server is there.
-        url: for ``server.base_url``.
-    """
-
-    fault: Fault
-    good_first: int = 0
-    count: int = 0
-    accepted: int = 0
-    probed: int = 0
-    url: str = ""
-    lock: threading.Lock = field(default_factory=threading.Lock)
-    closing: threading.Event = field(default_factory=threading.Event)
-
-    def __enter__(self) -> FaultyServer:
-        handler = type("_Bound", (Exchange,), {"faulty": self})
-        self._listener = _Listener(("127.0.0.1", 0), handler)
-        self.url = f"http://127.0.0.1:{self._listener.server_port}/v1"
-        threading.Thread(target=self._listener.serve_forever, args=(0.02,), daemon=True).start()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.closing.set()
-        self._listener.shutdown()
-        self._listener.server_close()

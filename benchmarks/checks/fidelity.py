@@ -16,8 +16,6 @@ from pathlib import Path
 
 import click
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from benchmarks.checks.comparisons import reachable as standing
 from benchmarks.checks.comparisons.containment import containment
@@ -34,11 +32,10 @@ from benchmarks.checks.comparisons.reachable import (
 )
 from benchmarks.checks.comparisons.room import WITHIN, held_out, rooms
 from benchmarks.checks.comparisons.visibility import visible_objects
-from benchmarks.checks.output import Output, write_figures
+from benchmarks.harness.output import SHARED, json_option, print_table, write_figures
 from er_gym.sim.space.walkable_floor import Rules
 
 CAPTURES = "unity_captures_dev.json"
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 PLACEMENTS_EACH = 10
 
 
@@ -140,25 +137,20 @@ def _share(name: str, part: int, whole: int, bound: float | None = None) -> Row:
 
 @click.command()
 @click.option("--shared", type=click.Path(file_okay=False, path_type=Path), default=SHARED)
-@click.option("--json", "json_file", type=Output())
-def main(shared: Path, json_file: Path | None) -> None:
+@json_option
+def main(shared: Path, file: Path | None) -> None:
     """Compare, and print the table; takes about a minute."""
-    rows = list(recorded_rows())
-    if (shared / CAPTURES).exists():
-        rows += captured_rows(shared / CAPTURES)
-    if (shared / POSITIONS).exists():
-        rows += sampled_rows(shared / POSITIONS)
-    table = Table("compared with AI2-THOR", "figure", "bound", "holds")
+    rows, left_out = list(recorded_rows()), []
+    for name, compared in ((CAPTURES, captured_rows), (POSITIONS, sampled_rows)):
+        if (shared / name).exists():
+            rows += compared(shared / name)
+        else:
+            left_out.append(f"There is no {shared / name} of AI2-THOR 5: not compared.")
     verdicts = {None: "", True: "yes", False: "NO"}
-    for row in rows:
-        table.add_row(row.name, row.figure, row.bound, verdicts[row.holds])
-    Console().print(table)
-    if not (shared / CAPTURES).exists():
-        click.echo(f"No captures of AI2-THOR 5 at {shared / CAPTURES}: visibility not compared.")
-    if not (shared / POSITIONS).exists():
-        click.echo(f"No positions of AI2-THOR 5 at {shared / POSITIONS}: not compared.")
-    if json_file is not None:
-        write_figures(json_file, [asdict(row) for row in rows])
+    cells = ((row.name, row.figure, row.bound, verdicts[row.holds]) for row in rows)
+    head = ("compared with AI2-THOR", "figure", "bound", "holds")
+    print_table("Fidelity", head, cells, words=4, notes=left_out)
+    write_figures(file, [asdict(row) for row in rows])
 
 
 if __name__ == "__main__":

@@ -15,9 +15,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import cycle
@@ -28,7 +26,7 @@ from PIL import Image
 
 from benchmarks.checks.foreign_values import NAMES, PICTURES, contents, mutations
 from benchmarks.checks.misuse.tries import require
-from benchmarks.checks.tally import Tally
+from benchmarks.harness.tally import Tally, holds, run_check, tally
 from er_gym.data.collection import Collection
 from er_gym.data.exports import export
 from er_gym.data.pictures import open_picture
@@ -72,25 +70,12 @@ class _Try(NamedTuple):
 
 def check(words: Sequence[str] = ()) -> Tally:
     """Try all whose names hold the words, and print the failures."""
-    began = time.monotonic()
-    count = short = 0
-    for each in (*_fields(), *_ids(), *_links(), *_pictures(), *_elsewhere(), *_exports()):
-        if all(word in each.name for word in words):
-            count += 1
-            if problem := _problem(each):
-                short += 1
-                print(f"{each.name:.200}: {problem}", flush=True)
-    return Tally("foreign files", count, short, time.monotonic() - began)
+    every = (*_fields(), *_ids(), *_links(), *_pictures(), *_elsewhere(), *_exports())
+    chosen = (each for each in every if holds(each.name, words))
+    return tally("foreign files", ((f"{each.name:.200}", _problems(each)) for each in chosen))
 
 
-def main(words: Sequence[str]) -> int:
-    """Try all; print the failures and their number."""
-    tally = check(words)
-    print(tally)
-    return int(tally.short > 0)
-
-
-def _problem(each: _Try) -> str:
+def _problems(each: _Try) -> Iterator[str]:
     """What is wrong after a try: in ``home`` are the user's files, in ``to`` is what was made."""
     with tempfile.TemporaryDirectory() as directory:
         top = Path(directory)
@@ -102,12 +87,13 @@ def _problem(each: _Try) -> str:
             each.do(top)
         except ValueError as error:  # what the commands tell in one line
             if "\n" in str(error) or len(str(error)) > _LONGEST:
-                return f"its error has several lines, or is too long: {str(error)[:200]!r}"
+                yield f"its error has several lines, or is too long: {str(error)[:200]!r}"
         except Exception as error:  # any other would be a traceback
-            return f"{type(error).__name__}: {str(error)[:300]}"
+            yield f"{type(error).__name__}: {str(error)[:300]}"
         left = sorted(each.name for each in top.iterdir() if each.name not in ("home", "to"))
         left += [str(each.relative_to(top)) for each in (top / "to").glob(".*")]
-        return f"left {left[:3]}" if left or Path("/tmp/er-gym-outside").exists() else ""
+        if left or Path("/tmp/er-gym-outside").exists():
+            yield f"left {left[:3]}"
 
 
 def _kept(top: Path, do: Callable[[], object]) -> None:
@@ -291,4 +277,4 @@ def _with(one: Trajectory, field: str, name: str) -> Trajectory:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    run_check(check, __doc__)

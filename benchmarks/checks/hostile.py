@@ -10,32 +10,33 @@ fewer, and no whole runs against failing servers.
 
 from __future__ import annotations
 
-import argparse
-import signal
-import sys
 from collections.abc import Iterator
 
-from benchmarks.checks.tally import Tally
+import click
+
+from benchmarks.harness.output import print_table
+from benchmarks.harness.tally import Tally, end_on_sigterm
 
 _LINES, _QUICK_LINES = 420, 60
 
 
-def main() -> int:
-    """Try everything, and print the failures."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    size = parser.add_mutually_exclusive_group()
-    size.add_argument("--quick", action="store_true", help="fewer command lines, no whole runs")
-    size.add_argument("--all", action="store_true", help="every command line")
-    given = parser.parse_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+@click.command(help=f"\b\n{__doc__}")
+@click.option("--quick", is_flag=True, help="Fewer command lines, no whole runs.")
+@click.option("--all", "every", is_flag=True, help="Every command line.")
+def main(quick: bool, every: bool) -> None:
+    if quick and every:
+        raise click.UsageError("give --quick or --all")
+    end_on_sigterm()
     tallies = []
-    for tally in _tallies(_QUICK_LINES if given.quick else None if given.all else _LINES):
-        print(tally, flush=True)
+    for tally in _tallies(_QUICK_LINES if quick else None if every else _LINES):
+        click.echo(tally)
         tallies.append(tally)
-    print(f"\n{'':16} {'tried':>6} {'fall short':>11} {'seconds':>8}")
-    for tally in (*tallies, sum(tallies, Tally("in all"))):
-        print(f"{tally.what:16} {tally.tried:6} {tally.short:11} {tally.seconds:8.0f}")
-    return int(any(tally.short for tally in tallies))
+    rows = [
+        (each.what, each.tried, each.short, f"{each.seconds:.0f}")
+        for each in (*tallies, sum(tallies, Tally("in all")))
+    ]
+    print_table("In all", ("", "tried", "fall short", "seconds"), rows)
+    raise SystemExit(int(any(tally.short for tally in tallies)))
 
 
 def _tallies(lines: int | None) -> Iterator[Tally]:
@@ -57,4 +58,4 @@ def _tallies(lines: int | None) -> Iterator[Tally]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

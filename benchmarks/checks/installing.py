@@ -21,10 +21,11 @@ import click
 
 from benchmarks.checks import terminals
 from benchmarks.cli.extras import extras
+from benchmarks.harness.output import ROOT
+from benchmarks.harness.tally import end
 
 _TRIED = "charts,ui,vlm"
 """The extras of the commands that are tried."""
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @click.command()
@@ -42,9 +43,7 @@ def main(wanted: tuple[str, ...], python: str, wheel: bool) -> None:
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([python, "-m", "venv", folder], check=True)
         if wheel:
-            tally = terminals.check(command=[str(installed(Path(folder)))], checkout=False)
-            click.echo(tally)
-            sys.exit(int(tally.short > 0))
+            end(terminals.check(command=[str(installed(Path(folder)))], checkout=False))
         for extra in wanted or ("", *extras()):
             started = time.perf_counter()
             said = resolve(Path(folder) / "bin" / "python", extra)

@@ -24,7 +24,7 @@ from functools import lru_cache
 from types import FrameType
 from typing import Any
 
-from benchmarks.checks.tally import Tally
+from benchmarks.harness.tally import Tally, Try, holds, run_check, tally
 
 LONG = 100_000
 _SHORT = 1_500
@@ -288,24 +288,32 @@ def lines_for(read: Reader, text: str) -> int:
 
 def slow(
     read: Reader, length: int = LONG, most: float = _MOST_SECONDS, *, framed: bool = True
-) -> Iterator[str]:
-    """The texts for which a reader takes more than its processor time, or raises an error."""
+) -> Iterator[Try]:
+    """Whether a reader takes more than its processor time for a text, or raises an error."""
     for name, text in texts(length, framed=framed):
-        try:
-            seconds_for(read, text, most)
-        except TooLong:
-            yield f"{name}: more than {most:g} s for {len(text):,} characters"
-        except Exception as error:  # a reader of strangers' texts raises nothing
-            yield f"{name}: {type(error).__name__}: {str(error)[:100]}"
+        yield name, _slow(read, text, most)
 
 
-def growing(read: Reader, length: int = _SHORT, *, framed: bool = True) -> Iterator[str]:
-    """The texts for which a reader runs more lines than in proportion."""
+def _slow(read: Reader, text: str, most: float) -> Iterator[str]:
+    try:
+        seconds_for(read, text, most)
+    except TooLong:
+        yield f"more than {most:g} s for {len(text):,} characters"
+    except Exception as error:  # a reader of strangers' texts raises nothing
+        yield f"{type(error).__name__}: {str(error)[:100]}"
+
+
+def growing(read: Reader, length: int = _SHORT, *, framed: bool = True) -> Iterator[Try]:
+    """Whether a reader runs more lines than in proportion for a text."""
     shorter, longer = texts(length, framed=framed), texts(2 * length, framed=framed)
     for (name, once), (_, twice) in zip(shorter, longer, strict=True):
-        first, second = lines_for(read, once), lines_for(read, twice)
-        if second > _MOST_GROWTH * first + _FEW_LINES:
-            yield f"{name}: {first:,} lines, and {second:,} for a text twice as long"
+        yield name, _growing(read, once, twice)
+
+
+def _growing(read: Reader, once: str, twice: str) -> Iterator[str]:
+    first, second = lines_for(read, once), lines_for(read, twice)
+    if second > _MOST_GROWTH * first + _FEW_LINES:
+        yield f"{first:,} lines, and {second:,} for a text twice as long"
 
 
 def check(words: Sequence[str] = (), *, framed: bool = True) -> Tally:
@@ -313,25 +321,17 @@ def check(words: Sequence[str] = (), *, framed: bool = True) -> Tally:
 
     If the texts are not to be ``framed``, there are fewer, and nothing stands around them.
     """
-    began, tried, short = time.monotonic(), 0, 0
+    return tally("long texts", _tries(words, framed))
+
+
+def _tries(words: Sequence[str], framed: bool) -> Iterator[Try]:
     for reader, read in readers().items():
-        if not all(word in reader for word in words):
-            continue
-        read("Put the Apple into the Fridge.")  # what is loaded once is loaded now
-        tried += (1 if reader in BOUNDED else 2) * sum(1 for _ in texts(0, framed=framed))
-        grows = () if reader in BOUNDED else growing(read, framed=framed)
-        for problem in (*grows, *slow(read, framed=framed)):
-            short += 1
-            print(f"{reader}, {problem}", flush=True)
-    return Tally("long texts", tried, short, time.monotonic() - began)
-
-
-def main(words: Sequence[str]) -> int:
-    """Print the failures and their number."""
-    tally = check(words)
-    print(tally)
-    return int(tally.short > 0)
+        if holds(reader, words):
+            read("Put the Apple into the Fridge.")  # what is loaded once is loaded now
+            grows = () if reader in BOUNDED else growing(read, framed=framed)
+            for name, problems in (*grows, *slow(read, framed=framed)):
+                yield f"{reader}, {name}", problems
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    run_check(check, __doc__)

@@ -20,11 +20,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import click
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
 
 from agents import make_agent
+from benchmarks.harness.output import print_table, progress
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.envs.actions import Action
@@ -235,33 +233,27 @@ def some_of_each_type(tasks: Sequence[Task], number: int, seed: int = 0) -> list
 @click.option("--seed", default=0, show_default=True)
 def main(suite: str, per_type: int | None, protocol: str, seed: int) -> None:
     """Play every task of a suite with every player, and judge each episode twice."""
-    console = Console(width=None if sys.stdout.isatty() else 140)
     tasks: Sequence[Task] = load_suite(suite).tasks
     if per_type is not None:
         tasks = some_of_each_type(tasks, per_type, seed)
     counts: dict[str, Counter[str]] = {player: Counter() for player in PLAYERS}
-    apart = 0
     episodes = judge_all(tasks, protocol, seed)
-    for found in track(episodes, "Judging", len(tasks) * len(PLAYERS), console=console):
+    for found in progress(episodes, "Judging", len(tasks) * len(PLAYERS)):
         count, record = counts[found.player], found.record
         count["episodes"] += 1
-        count["env"] += record.success
-        count["scorer"] += score_episode(record, CORRECTED).success
-        count["end"] += record.end_reason == "end"
+        count["ended by end"] += record.end_reason == "end"
+        count["env: success"] += record.success
+        count["scorer: success"] += score_episode(record, CORRECTED).success
         count["apart"] += bool(found.apart)
         for what in found.apart:
-            apart += 1
-            console.print(
-                f"{record.task_id}, {found.player}: {what}", markup=False, highlight=False
-            )
-    table = Table(title=f"{suite}, protocol {protocol}", title_justify="left")
-    for name in ("player", "episodes", "ended by end", "env: success", "scorer: success", "apart"):
-        table.add_column(name, justify="left" if name == "player" else "right")
-    for player, count in counts.items():
-        columns = ("episodes", "end", "env", "scorer", "apart")
-        table.add_row(player, *(str(count[name]) for name in columns))
-    console.print(table)
-    sys.exit(1 if apart else 0)
+            click.echo(f"{record.task_id}, {found.player}: {what}")
+    columns = ("episodes", "ended by end", "env: success", "scorer: success", "apart")
+    print_table(
+        f"{suite}, protocol {protocol}",
+        ("player", *columns),
+        ((player, *map(count.__getitem__, columns)) for player, count in counts.items()),
+    )
+    sys.exit(int(any(count["apart"] for count in counts.values())))
 
 
 if __name__ == "__main__":

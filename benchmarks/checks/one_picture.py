@@ -25,7 +25,6 @@ from typing import Any
 
 import click
 import numpy as np
-from rich.console import Console
 
 from er_gym.sim.engine import Engine
 from er_gym.sim.render.view import View
@@ -372,8 +371,7 @@ def _fresh(states: list[int], hash_seed: int) -> dict[int, Digests]:
 class Differences:
     """The number of comparisons, and the differences."""
 
-    def __init__(self, console: Console) -> None:
-        self.console = console
+    def __init__(self) -> None:
         self.counts = Counter[str]()
         self.apart = 0
 
@@ -390,7 +388,7 @@ class Differences:
     def differs(self, what: str) -> None:
         """Add a difference."""
         self.apart += 1
-        self.console.print(what, markup=False, highlight=False)
+        click.echo(what)
 
 
 @click.command()
@@ -402,8 +400,7 @@ def main(states: int, processes: int, say: bool) -> None:
     if say:
         _say()
         return
-    console = Console()
-    found, said = Differences(console), {}
+    found, said = Differences(), {}
     players = {by: Replayer() for by in HISTORIES}
     for number in range(states):
         wanted = recipe(number)
@@ -426,8 +423,8 @@ def main(states: int, processes: int, say: bool) -> None:
                 if told[name] != said[number][name]:
                     found.differs(f"state {number}, fresh process {hash_seed}: {name}")
     for name, count in found.counts.items():
-        console.print(f"{count:6d} {name}", highlight=False)
-    console.print(f"{found.apart:6d} differences in {states} states", highlight=False)
+        click.echo(f"{count:6d} {name}")
+    click.echo(f"{found.apart:6d} differences in {states} states")
     sys.exit(1 if found.apart else 0)
 
 

@@ -37,10 +37,8 @@ from typing import Any
 
 import click
 from PIL import Image
-from rich.console import Console
-from rich.progress import track
 
-from benchmarks.checks.output import Output, write_figures
+from benchmarks.harness.output import json_option, progress, write_figures
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.scorers import PAPER
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -265,12 +263,12 @@ def as_record(ours: EpisodeRecord, theirs: list[dict[str, Any]]) -> EpisodeRecor
 
 def compare(
     theirs: PaperProgram, records: Sequence[dict[str, Any]], tasks: Sequence[Task], episodes: int,
-    seed: int, console: Console,
+    seed: int,
 ) -> PaperAgreement:  # fmt: skip
     """Play and count; ``records``: the same tasks as their file has them."""
     env = EmbodiedEnv((), obs_mode="state", protocol=PAPER.name)
     found, kinds = PaperAgreement(), dict[str, list[str]]()
-    for number in track(range(episodes), "episodes", console=console):
+    for number in progress(range(episodes), "episodes"):
         draw = random.Random(f"{seed}/{number}")
         place = (number * 7919 + seed) % len(tasks)
         task, record = tasks[place], records[place]
@@ -312,7 +310,7 @@ _file = click.Path(exists=True, dir_okay=False, path_type=Path)
 @click.option("--poses", required=True, type=_file)
 @click.option("--episodes", default=300, show_default=True, type=click.IntRange(1))
 @click.option("--seed", default=0, show_default=True)
-@click.option("--json", "file", type=Output())
+@json_option
 def main(
     theirs: Path, tasks_file: Path, poses: Path, episodes: int, seed: int, file: Path | None
 ) -> None:
@@ -321,7 +319,7 @@ def main(
     tasks = with_every_pose(read_tasks(tasks_file), read_poses(poses))
     program = PaperProgram(theirs, poses)
     try:
-        found = compare(program, records, tasks, episodes, seed, Console(stderr=True))
+        found = compare(program, records, tasks, episodes, seed)
     finally:
         program.close()
     steps = f"{found.equal} of {found.steps} ({found.equal / max(1, found.steps):.1%})"
@@ -331,8 +329,7 @@ def main(
     print(f"our scorer on their trajectories: {found.equal_rescored} of {found.scored}")
     for kind, count in found.differences.most_common():
         print(f"  {count:4} {kind}")
-    if file is not None:
-        write_figures(file, vars(found))
+    write_figures(file, vars(found))
 
 
 if __name__ == "__main__":

@@ -16,7 +16,6 @@ of the poses some doors and drawers open. At each pose two shares are counted, a
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -25,11 +24,8 @@ from typing import Any
 
 import click
 import numpy as np
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
 
-from benchmarks.checks.output import Output, write_figures
+from benchmarks.harness.output import json_option, print_table, progress, write_figures
 from er_gym.thor import SCENE_NAMES, make_controller
 
 SIZES = ((300, 300), (800, 450))
@@ -107,17 +103,14 @@ def _share(part: int, whole: int) -> str:
     return f"{part / whole:.1%}" if whole else ""
 
 
-def sightings(
-    poses: int, seed: int, opened: float, console: Console | None = None
-) -> Iterator[Sighting]:
+def sightings(poses: int, seed: int, opened: float) -> Iterator[Sighting]:
     """Sightings from random poses; ``opened``: the share of poses with some doors open.
 
     The poses are the same at both sizes.
     """
     random = np.random.default_rng(seed)
     controller = make_controller(renderInstanceSegmentation=True)
-    hidden = console is None or not console.is_terminal
-    for _ in track(range(poses), "poses", console=console, disable=hidden):
+    for _ in progress(range(poses), "poses"):
         scene, reach = str(random.choice(SCENE_NAMES)), float(random.choice(DISTANCES))
         draws, ajar = random.random(4), random.random() < opened
         turn = int(random.choice(TURNS))
@@ -164,29 +157,23 @@ def _pixels(event: Any) -> Mapping[str, int]:
     }
 
 
-def _tables(found: list[Sighting]) -> Iterator[Table]:
+def _show(found: list[Sighting]) -> None:
+    """Print the shares of each size, and then of the types."""
     columns = ("visible", f">= {LEAST} px", "any px", f"with {LEAST} px", "visible")
-    table = Table(title=f"picture and metadata; wanted: {SHOWN:.0%} and {TOLD:.0%}")
-    table.add_column("pictures")
-    for name in columns:
-        table.add_column(name, justify="right")
+    rows: list[tuple[str, Shares]] = []
     for size in SIZES:
         at = [s for s in found if s.size == size]
-        name = "{}×{}".format(*size)
-        table.add_row(name, *Shares.of(at).row())
-        for reach in DISTANCES:
-            row = Shares.of(s for s in at if s.reach == reach).row()
-            table.add_row(f"  visibilityDistance {reach:g}", *row, style="dim")
-    yield table
+        rows.append(("{}×{}".format(*size), Shares.of(at)))
+        rows += [
+            (f"visibilityDistance {reach:g}", Shares.of(s for s in at if s.reach == reach))
+            for reach in DISTANCES
+        ]
+    title = f"picture and metadata; wanted: {SHOWN:.0%} and {TOLD:.0%}"
+    print_table(title, ("pictures", *columns), ((name, *each.row()) for name, each in rows))
     for size in SIZES:
-        table = Table(title="{}×{}: the types that disagree most".format(*size))
-        table.add_column("type")
-        for name in columns:
-            table.add_column(name, justify="right")
-        kinds = by_type(s for s in found if s.size == size)
-        for kind, shares in list(kinds.items())[:_ROWS]:
-            table.add_row(kind, *shares.row())
-        yield table
+        kinds = [*by_type(s for s in found if s.size == size).items()][:_ROWS]
+        title = "{}×{}: the types that disagree most".format(*size)
+        print_table(title, ("type", *columns), ((kind, *each.row()) for kind, each in kinds))
 
 
 def by_type(found: Iterable[Sighting]) -> dict[str, Shares]:
@@ -202,22 +189,19 @@ def by_type(found: Iterable[Sighting]) -> dict[str, Shares]:
 @click.option("--poses", default=300, show_default=True, type=click.IntRange(1))
 @click.option("--seed", default=0, show_default=True)
 @click.option("--opened", default=0.3, show_default=True, type=click.FloatRange(0, 1))
-@click.option("--json", "file", type=Output())
+@json_option
 def main(poses: int, seed: int, opened: float, file: Path | None) -> None:
     """Compare, and print the shares, and the types that disagree most."""
-    found = list(sightings(poses, seed, opened, Console(stderr=True)))
-    console = Console(width=None if sys.stdout.isatty() else 100)
-    for table in _tables(found):
-        console.print(table)
-    if file is not None:
-        told = {
-            "{}x{}".format(*size): {
-                kind: vars(shares)
-                for kind, shares in by_type(s for s in found if s.size == size).items()
-            }
-            for size in SIZES
+    found = list(sightings(poses, seed, opened))
+    _show(found)
+    told = {
+        "{}x{}".format(*size): {
+            kind: vars(shares)
+            for kind, shares in by_type(s for s in found if s.size == size).items()
         }
-        write_figures(file, told)
+        for size in SIZES
+    }
+    write_figures(file, told)
 
 
 if __name__ == "__main__":

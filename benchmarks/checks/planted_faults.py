@@ -14,7 +14,7 @@ tries once more what survived, after tests were added. ``--one ID`` shows a faul
 Faults are not planted in what only says something (docstrings, messages of errors and logs,
 ``__repr__``), in what only checks the program's own promises (annotations, ``assert``,
 ``strict=``), in decorators and in f-strings. Faults that change nothing that a user can see were
-judged so by hand, and are listed with their reasons in ``planting/equivalent.py``.
+judged so by hand, and are listed with their reasons in ``planting/mirrors.py``.
 
 The mutation testers on PyPI do not fit. mutmut makes every fault of a file, in functions only, and
 none of ``mutmut``'s and ``cosmic-ray``'s kinds swaps arguments; cosmic-ray changes the working tree
@@ -23,6 +23,7 @@ and runs one command of tests for all; neither draws a seeded sample or counts b
 
 from __future__ import annotations
 
+import json
 import sys
 import tempfile
 from collections import Counter
@@ -31,10 +32,8 @@ from pathlib import Path
 
 import click
 
-from benchmarks.checks.output import write_figures
-from benchmarks.checks.planting.equivalent import EQUIVALENT
 from benchmarks.checks.planting.faults import Fault, chosen, faults_of
-from benchmarks.checks.planting.mirrors import PACKAGES, tests_of
+from benchmarks.checks.planting.mirrors import EQUIVALENT, PACKAGES, tests_of
 from benchmarks.checks.planting.reach import (
     Reach,
     failing_of,
@@ -43,9 +42,9 @@ from benchmarks.checks.planting.reach import (
     run_tests,
     scratch_copy,
 )
+from benchmarks.harness.output import ROOT, print_table, write_figures
 from er_gym.tasks.reading import read_text
 
-ROOT = Path(__file__).resolve().parents[2]
 _ENOUGH = 0.9
 """The share of faults that the tests of each package must notice."""
 _LIMIT, _SLACK = 60.0, 10
@@ -110,7 +109,8 @@ def main(
     if only_list:
         return
     results = _try_all(picked, work, fresh=identity is not None, again=again, by=by)
-    click.echo(table(picked, results))
+    head = ("package", "faults", *_RESULTS, "rate")
+    print_table("Planted faults", head, table(picked, results))
     counts = Counter(results[each.id] for faults in picked.values() for each in faults)
     noticed = counts[_NOTICED] + counts[_LATE]
     sys.exit(int(noticed < _ENOUGH * (sum(counts.values()) - counts[_SAME])))
@@ -158,8 +158,6 @@ def _try_all(
 
 
 def _kept(file: Path) -> dict[str, dict[str, str]]:
-    import json
-
     if not file.is_file():
         return {}
     kept: dict[str, dict[str, str]] = json.loads(read_text(file, 10_000_000))["figures"]
@@ -183,20 +181,20 @@ def _try(
     return (_SURVIVED if reached else _UNREACHED), ""
 
 
-def table(picked: Mapping[str, Sequence[Fault]], results: Mapping[str, str]) -> str:
+def table(
+    picked: Mapping[str, Sequence[Fault]], results: Mapping[str, str]
+) -> list[tuple[object, ...]]:
     """Counts by package: the rate is that of noticed faults among those that change something."""
     counts = {
         package: Counter(results[fault.id] for fault in faults)
         for package, faults in picked.items()
     }
-    rows = [*counts.items(), ("in all", sum(counts.values(), Counter()))]
-    lines = [f"\n{'':20}{'faults':>8}" + "".join(f"{each:>10}" for each in (*_RESULTS, "rate"))]
-    for name, row in rows:
+    rows: list[tuple[object, ...]] = []
+    for name, row in (*counts.items(), ("in all", sum(counts.values(), Counter()))):
         noticed, real = row[_NOTICED] + row[_LATE], sum(row.values()) - row[_SAME]
         rate = f"{100 * noticed / real:.0f} %" if real else "-"
-        numbers = "".join(f"{row[each]:10}" for each in _RESULTS)
-        lines.append(f"{name:20}{sum(row.values()):8}{numbers}{rate:>10}")
-    return "\n".join(lines)
+        rows.append((name, sum(row.values()), *(row[each] for each in _RESULTS), rate))
+    return rows
 
 
 if __name__ == "__main__":

@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-import signal
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from benchmarks.harness.processes import kill
 from er_gym.rollout.cluster.session import LOCAL_ENVIRONMENT, auth_token, on_loopback, same_signals
 
 _STORE_BYTES = 100 * 2**20
@@ -88,12 +88,6 @@ def ray_nodes(count: int, cpus: float = 1) -> Iterator[RayNodes]:
         shutil.rmtree(folder, ignore_errors=True)
         for name in environment:
             os.environ.pop(name, None)
-
-
-def kill(process: int) -> None:
-    """Kill a process by SIGKILL; nothing happens if it has ended."""
-    with contextlib.suppress(ProcessLookupError):
-        os.kill(process, signal.SIGKILL)
 
 
 def _title(folder: Path) -> str:

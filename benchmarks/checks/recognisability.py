@@ -13,23 +13,24 @@ Half of the poses are anywhere, half look at a thing from 0.5 to 2.5 m away.
 from __future__ import annotations
 
 import importlib.util
-import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
-from rich.console import Console
-from rich.progress import track
-from rich.table import Column, Table
 
-from benchmarks.checks.output import Output, write_figures
+from benchmarks.harness.output import (
+    Output,
+    json_option,
+    print_table,
+    progress,
+    write_figures,
+)
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.scene_graph import scene_graph_of
 from er_gym.sim.scene import SCENE_NAMES, load_scene
@@ -215,7 +216,7 @@ def crop(picture: NDArray[np.uint8], box: Sequence[int]) -> NDArray[np.uint8]:
 
 
 def train_and_classify(
-    learnt: Crops, asked: Crops, classes: int, epochs: int, seed: int, console: Console
+    learnt: Crops, asked: Crops, classes: int, epochs: int, seed: int
 ) -> NDArray[np.int64]:
     """Train a network of 0.4 million weights on some crops; returns its predictions for others,
     (N,).
@@ -258,7 +259,7 @@ def train_and_classify(
     batches = len(labels) // BATCH
     optimiser = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=0.02)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, RATE, epochs * batches)
-    for epoch in track(range(epochs), "epochs", console=console, disable=not console.is_terminal):
+    for epoch in progress(range(epochs), "epochs"):
         network.train()
         total = 0.0
         for chosen in torch.randperm(len(labels))[: batches * BATCH].view(batches, BATCH):
@@ -269,7 +270,7 @@ def train_and_classify(
             optimiser.step()
             schedule.step()
             total += loss.item()
-        console.print(f"epoch {epoch + 1}: loss {total / batches:.3f}")
+        click.echo(f"epoch {epoch + 1}: loss {total / batches:.3f}", err=True)
     network.eval()
     with torch.no_grad():
         parts = np.array_split(asked.images, max(1, len(asked.images) // 512))
@@ -280,18 +281,20 @@ def train_and_classify(
 # -- what is printed -------------------------------------------------------------------------------
 
 
-def _table(result: Classification, figures: dict[str, float]) -> Table:
-    crops, correct = (Column(name, justify="right") for name in ("crops", "top-1"))
-    table = Table("type", crops, correct, "taken for", title="types told apart in unseen scenes")
-    for kind in result.worst_first()[:10]:
-        others = ", ".join(f"{name} {share:.0%}" for name, share in result.taken_for(kind)[:3])
-        count = str(int((result.truth == kind).sum()))
-        table.add_row(result.types[kind], count, f"{result.share_correct(kind):.1%}", others)
-    table.add_section()
-    for name, value in figures.items():
-        text = f"{value:.1%}" if value <= 1 else f"{value:.0f}"
-        table.add_row(name, "", text, "target: >= 80 %" if name == "top-1" else "")
-    return table
+def _show(result: Classification, figures: dict[str, float]) -> None:
+    rows = [
+        (
+            result.types[kind],
+            f"{result.share_correct(kind):.1%}",
+            int((result.truth == kind).sum()),
+            ", ".join(f"{name} {share:.0%}" for name, share in result.taken_for(kind)[:3]),
+        )
+        for kind in result.worst_first()[:10]
+    ]
+    head = ("type", "top-1", "crops", "taken for")
+    print_table("types told apart in unseen scenes", head, rows)
+    texts = {name: f"{x:.1%}" if x <= 1 else f"{x:.0f}" for name, x in figures.items()}
+    print_table("in all; target of top-1: >= 80 %", ("figure", "value"), texts.items())
 
 
 def draw_sheet(result: Classification, images: NDArray[np.uint8], file: Path) -> None:
@@ -320,20 +323,20 @@ def draw_sheet(result: Classification, images: NDArray[np.uint8], file: Path) ->
     "--crops-per-scene", "most", default=8, show_default=True, type=click.IntRange(1),
     help="At most so many of a type.",
 )  # fmt: skip
-@click.option("--json", "file", type=Output())
+@json_option
 @click.option("--sheet", type=Output(), help="Wrong crops.")
 def main(seed: int, epochs: int, most: int, file: Path | None, sheet: Path | None) -> None:
     """Draw crops, train the network, and print the types that it confuses."""
     if importlib.util.find_spec("torch") is None:
         raise click.ClickException("this needs torch: pip install -e '.[rl]'")
-    start, console, parts = time.perf_counter(), Console(stderr=True), dict[str, Crops]()
-    types, (learning, held), hidden = commonest_types(), split(seed), not console.is_terminal
-    for name in track(SCENE_NAMES, "scenes", console=console, disable=hidden):
+    start, parts = time.perf_counter(), dict[str, Crops]()
+    types, (learning, held) = commonest_types(), split(seed)
+    for name in progress(SCENE_NAMES, "scenes"):
         random = np.random.default_rng([seed, SCENE_NAMES.index(name)])
         parts[name] = crops_of(name, types, most, random)
     learnt, asked = (Crops.joined([parts[name] for name in names]) for names in (learning, held))
     drawn = time.perf_counter()
-    said = train_and_classify(learnt, asked, len(types), epochs, seed, console)
+    said = train_and_classify(learnt, asked, len(types), epochs, seed)
     result = Classification(types, asked.labels, said)
     figures: dict[str, float] = {
         "top-1": result.top1,
@@ -343,18 +346,18 @@ def main(seed: int, epochs: int, most: int, file: Path | None, sheet: Path | Non
         "seconds to draw": drawn - start,
         "seconds to train": time.perf_counter() - drawn,
     }
-    Console(width=None if sys.stdout.isatty() else 110).print(_table(result, figures))
+    _show(result, figures)
     if sheet is not None:
         draw_sheet(result, asked.images, sheet)
-    if file is not None:
-        told: dict[str, Any] = {**figures, "types": {}}
-        for kind in result.worst_first():
-            told["types"][types[kind]] = {
-                "crops": int((result.truth == kind).sum()),
-                "top-1": result.share_correct(kind),
-                "taken for": dict(result.taken_for(kind)),
-            }
-        write_figures(file, told)
+    told = {
+        types[kind]: {
+            "crops": int((result.truth == kind).sum()),
+            "top-1": result.share_correct(kind),
+            "taken for": dict(result.taken_for(kind)),
+        }
+        for kind in result.worst_first()
+    }
+    write_figures(file, {**figures, "types": told})
 
 
 if __name__ == "__main__":

@@ -6,17 +6,22 @@ It reads the prompts of ``configs/prompts/expert/en`` and, for a model that deci
 
 from __future__ import annotations
 
-import hashlib
-import json
-import random
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
-from benchmarks.checks.faulty_server import Exchange, FaultyServer, body, completion, error
+from benchmarks.harness.chat_server import (
+    GOOD,
+    ChatServer,
+    Fault,
+    Messages,
+    body,
+    drawn,
+    error,
+    replies,
+    text_of,
+)
 
-Messages = Sequence[Mapping[str, Any]]
 _TAG = re.compile(r"^<(Observation|Thinking|Planning|Reflection|Verification)>", re.MULTILINE)
 _DECISION = re.compile(r"The robot's decision: ([^,(]+?) ?(?:\(the ([^)]+)\))?, ")
 _PLAN = re.compile(r"in this order: (.+?)\. You may look elsewhere")
@@ -45,14 +50,6 @@ _DEEDS: Mapping[str, str] = {
     "move forward": "I will take a step forward now.",
     "end": "The task is done, so I will stop here.",
 }
-
-
-def text_of(message: Mapping[str, Any]) -> str:
-    """The texts of a message, without its pictures."""
-    content = message["content"]
-    if isinstance(content, str):
-        return content
-    return "\n".join(part.get("text", "") for part in content)
 
 
 def good(messages: Messages) -> str:
@@ -130,64 +127,27 @@ SAYS: Mapping[str, Callable[[Messages], str]] = {
 """Answers that are no thoughts of the robot, by name."""
 
 
-@dataclass
-class ScriptedExpert(FaultyServer):
-    """The server; its faults are drawn for each request.
-
-    Attributes:
-        repeated: how many requests came again that had a whole answer before.
-    """
-
-    repeated: int = 0
-    _answered: set[bytes] = field(default_factory=set)
-
-    def __enter__(self) -> ScriptedExpert:
-        super().__enter__()
-        return self
-
-    def note_answer(self, request: bytes) -> None:
-        """Note that a request gets a whole answer."""
-        digest = hashlib.sha256(request).digest()
-        with self.lock:
-            self.repeated += digest in self._answered
-            self._answered.add(digest)
+def answers(say: Callable[[Messages], str], **changed: Any) -> Fault:
+    """A good answer in form, with these words; about four bytes are counted as a token."""
+    return replies(say, tokens=_tokens, **changed)
 
 
-def answers(say: Callable[[Messages], str], **changed: Any) -> Callable[[Exchange], None]:
-    """A good answer in form, with these words; tokens are counted as four bytes each."""
-
-    def fault(exchange: Exchange) -> None:
-        words = say(json.loads(exchange.body)["messages"])
-        assert isinstance(exchange.faulty, ScriptedExpert)
-        exchange.faulty.note_answer(exchange.body)
-        heard, said = len(exchange.body) // 40 + 1, len(words) // 4 + 1
-        counts = {"prompt_tokens": heard, "completion_tokens": said, "total_tokens": heard + said}
-        exchange.send(
-            json.dumps(
-                completion(choices__0__message__content=words, usage=counts, **changed)
-            ).encode()
-        )
-
-    return fault
+def _tokens(heard: bytes, said: str) -> tuple[int, int]:
+    return len(heard) // 40 + 1, len(said) // 4 + 1  # most of what is heard is pictures
 
 
-def _slow(exchange: Exchange) -> None:
-    exchange.faulty.closing.wait(0.4)
-    answers(good)(exchange)
-
-
-FAILS: Mapping[str, Callable[[Exchange], None]] = {
+FAILS: Mapping[str, Fault] = {
     "429": error(429, "slow down", Retry_After="0.05"),
     "500": error(500, "something broke"),
-    "half a body": body(json.dumps(completion()).encode()[:-40]),
+    "half a body": body(GOOD[:-40]),
     "a page": body(b"<html>Welcome</html>"),
     "cut": answers(_cut, choices__0__finish_reason="length"),
-    "slow": _slow,
+    "slow": replies(good, tokens=_tokens, latency=0.4),
 }
 """Faults of the server, by name."""
 
 
-def scripted_expert(bad: float = 0.0, failing: float = 0.0, seed: int = 0) -> ScriptedExpert:
+def scripted_expert(bad: float = 0.0, failing: float = 0.0, seed: int = 0) -> ChatServer:
     """A server; use it as a context manager.
 
     Args:
@@ -195,16 +155,7 @@ def scripted_expert(bad: float = 0.0, failing: float = 0.0, seed: int = 0) -> Sc
         failing: the share of faults in :data:`FAILS`.
         seed: of the draws.
     """
-    draws = random.Random(seed)
-
-    def fault(exchange: Exchange) -> None:
-        with exchange.faulty.lock:
-            drawn, which = draws.random(), draws.random()
-        chosen: Callable[[Exchange], None] = answers(good)
-        if drawn < bad:
-            chosen = answers([*SAYS.values()][int(which * len(SAYS))])
-        elif drawn < bad + failing:
-            chosen = [*FAILS.values()][int(which * len(FAILS))]
-        chosen(exchange)
-
-    return ScriptedExpert(fault)
+    faults = {"good": (1.0 - bad - failing, answers(good))}
+    faults |= {name: (bad / len(SAYS), answers(say)) for name, say in SAYS.items()}
+    faults |= {name: (failing / len(FAILS), fault) for name, fault in FAILS.items()}
+    return ChatServer(drawn(faults, seed))

@@ -18,11 +18,8 @@ import json
 import logging
 import math
 import os
-import signal
-import subprocess
-import sys
+import re
 import tempfile
-import threading
 import time
 import traceback
 from collections.abc import Iterator, Sequence
@@ -35,8 +32,12 @@ from agents.vlm.clients.budget import Budget
 from agents.vlm.clients.supervisor import ServerEvent
 from agents.vlm.factory import AgentFactory
 from agents.vlm.settings import AgentSettings
-from benchmarks.checks.faulty_server import CASES, KEY, Case, FaultyServer
-from benchmarks.checks.tally import Tally
+from benchmarks.checks.faulty_server import CASES, KEY, Case
+from benchmarks.harness import processes
+from benchmarks.harness.chat_server import ChatServer
+from benchmarks.harness.output import ROOT
+from benchmarks.harness.processes import ER_GYM
+from benchmarks.harness.tally import Tally, Try, holds, run_check, tally
 from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.run_directory import SPENDING
 
@@ -51,37 +52,22 @@ _ASKED = (
 )
 
 
-def main(words: Sequence[str]) -> int:
-    """Try all faults; print the failures and their number."""
-    tally = check(words)
-    print(tally)
-    return int(tally.short > 0)
-
-
 def check(words: Sequence[str], *, with_runs: bool = True) -> Tally:
     """Try the faults and runs whose names hold the words, and print the failures."""
     os.environ[_KEY_FROM] = KEY
-    # What a shell starts in the background ignores Ctrl-C, and so would the commands tried here.
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    chosen = [case for case in CASES if all(word in case.name for word in words)]
-    began = time.monotonic()
-    short = 0
+    return tally("server faults", _tries(words, with_runs))
+
+
+def _tries(words: Sequence[str], with_runs: bool) -> Iterator[Try]:
+    chosen = [case for case in CASES if holds(case.name, words)]
     with _logged() as log, ThreadPoolExecutor(_AT_ONCE) as pool:
         for case, problems in zip(chosen, pool.map(_try, chosen), strict=True):
-            short += bool(problems)
-            for problem in problems:
-                print(f"{case.name}: {problem}", flush=True)
-    if KEY in log.getvalue():
-        short += 1
-        print("the key is in the logs")
-    runs = [run for run in RUNS if with_runs and all(word in run.name for word in words)]
+            yield case.name, problems
+    yield "the logs", ["the key is in them"] if KEY in log.getvalue() else []
+    runs = [run for run in RUNS if with_runs and holds(run.name, words)]
     with ThreadPoolExecutor(_RUNS_AT_ONCE) as pool:
         for run, problems in zip(runs, pool.map(_play, runs), strict=True):
-            short += bool(problems)
-            for problem in problems:
-                print(f"er-gym bench, {run.name}: {problem}", flush=True)
-    return Tally("server faults", len(chosen) + len(runs), short, time.monotonic() - began)
+            yield f"er-gym bench, {run.name}", problems
 
 
 @contextlib.contextmanager
@@ -104,11 +90,11 @@ def _logged() -> Iterator[io.StringIO]:
 
 
 def _try(case: Case) -> list[str]:
-    with FaultyServer(case.fault) as server, tempfile.TemporaryDirectory() as directory:
+    with ChatServer(case.fault) as server, tempfile.TemporaryDirectory() as directory:
         return list(_problems(case, server, Path(directory)))
 
 
-def _problems(case: Case, server: FaultyServer, directory: Path) -> Iterator[str]:
+def _problems(case: Case, server: ChatServer, directory: Path) -> Iterator[str]:
     settings = AgentSettings.model_validate(
         {
             "server": {
@@ -179,7 +165,7 @@ def _wrong_reply(reply: Reply) -> Iterator[str]:
         yield f"an impossible cost: {reply.cost}"
 
 
-def _wrong_ledger(directory: Path, server: FaultyServer, replies: int) -> Iterator[str]:
+def _wrong_ledger(directory: Path, server: ChatServer, replies: int) -> Iterator[str]:
     entries = [json.loads(line) for line in _lines(directory / SPENDING)]
     if sum(not each["rejected"] for each in entries) != replies + server.probed:
         yield f"{replies} replies, and in the ledger: {entries}"
@@ -305,35 +291,24 @@ def _play(run: Run) -> list[str]:
 
 def _run_problems(run: Run) -> Iterator[str]:
     fault = next(case.fault for case in CASES if case.name == run.fault)
-    with FaultyServer(fault, run.good_first) as server, tempfile.TemporaryDirectory() as directory:
+    with ChatServer(fault, run.good_first) as server, tempfile.TemporaryDirectory() as directory:
         command = [
-            sys.executable, "-m", "benchmarks.cli", "bench", "--suite", "mini", "--limit", "40",
+            *ER_GYM, "bench", "--suite", "mini", "--limit", "40",
             "--agent", "openai:m", "--agent-config", "text", "--base-url", server.url,
             "--set", f"server.key_from={_KEY_FROM}", "--set", "prices.prompt=2",
             "--set", "prices.completion=10", "--out", directory, *run.options,
         ]  # fmt: skip
-        began = time.monotonic()
-        process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        until = re.escape(run.interrupt)
+        done = processes.run(
+            command, cwd=ROOT, terminal=False, until=until, seconds=run.seconds + 30
         )
-        assert process.stdout is not None
-        end = threading.Timer(run.seconds + 30, process.kill)
-        end.start()
-        said, interrupted = "", 0.0
-        for line in process.stdout:
-            said += line
-            if run.interrupt and run.interrupt in line and not interrupted:
-                interrupted = time.monotonic()
-                process.send_signal(signal.SIGINT)
-        process.wait()
-        end.cancel()
-        ended = time.monotonic()
-        if interrupted and ended - interrupted > 6:
-            yield f"took {ended - interrupted:.1f} s to end after Ctrl-C"
-        if ended - began > run.seconds:
-            yield f"took {ended - began:.1f} s"
-        if process.returncode != run.code:
-            yield f"ended with {process.returncode}, not {run.code}: {said[-1500:]}"
+        said = done.text()
+        if done.ending > 6:
+            yield f"took {done.ending:.1f} s to end after Ctrl-C"
+        if done.seconds + done.ending > run.seconds:
+            yield f"took {done.seconds + done.ending:.1f} s"
+        if done.code != run.code:
+            yield f"ended with {done.code}, not {run.code}: {said[-1500:]}"
         if run.says not in said:
             yield f"does not say {run.says!r}: {said[-1500:]}"
         if "Traceback" in said or KEY in said:
@@ -347,4 +322,4 @@ def _run_problems(run: Run) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    run_check(check, __doc__)

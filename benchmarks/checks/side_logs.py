@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -23,7 +22,8 @@ from pathlib import Path
 from random import Random
 
 from agents.rl.callbacks import read_curve
-from benchmarks.checks.tally import Tally
+from benchmarks.harness.processes import ER_GYM
+from benchmarks.harness.tally import Tally, run_check, tally
 from benchmarks.scoring.report import load_run, slices
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.rollout.events import read_events
@@ -110,41 +110,32 @@ _KINDS = (
 )  # fmt: skip
 
 
-def check(tries: int = _TRIES) -> Tally:
-    """Try all kinds in turn; print the failures."""
-    begun, short = time.monotonic(), 0
-    for number in range(tries):
-        with tempfile.TemporaryDirectory() as folder:
-            problems = [*_try(number, _KINDS[number % len(_KINDS)], Path(folder) / "run")]
-        for problem in problems:
-            print(f"try {number}: {problem}", flush=True)
-        short += bool(problems)
-    return Tally("runs killed", tries, short, time.monotonic() - begun)
+def check(tries: Sequence[str] = ()) -> Tally:
+    """Try all kinds in turn, so often in all; print the failures."""
+    numbers = range(int(tries[0]) if tries else _TRIES)
+    return tally(
+        "runs killed", ((f"try {n}", _problems(n, _KINDS[n % len(_KINDS)])) for n in numbers)
+    )
 
 
-def _try(number: int, kind: _Kind, run: Path) -> Iterator[str]:
-    command = [sys.executable, "-m", "benchmarks.cli", *kind.options, "--out", str(run)]
-    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+def _problems(number: int, kind: _Kind) -> Iterator[str]:
     random = Random(number)
-    for point in sorted(random.sample(range(1, kind.most), _KILLS)):
-        with subprocess.Popen(command, **silent) as process:  # type: ignore[call-overload]
-            while kind.progress(run) < point and process.poll() is None:
-                time.sleep(0.002)
-            time.sleep(random.uniform(0, 0.1))
-            process.send_signal(signal.SIGKILL)
-    ended = subprocess.run(command, capture_output=True, text=True, check=False)
-    if ended.returncode:
-        yield f"{kind.options[0]} ended with {ended.returncode}: {ended.stderr[-300:]}"
-    else:
-        yield from kind.problems(run)
-
-
-def main(arguments: Sequence[str]) -> int:
-    """Try, and print the number of failures."""
-    tally = check(int(arguments[0]) if arguments else _TRIES)
-    print(tally)
-    return int(tally.short > 0)
+    with tempfile.TemporaryDirectory() as folder:
+        run = Path(folder) / "run"
+        command = [*ER_GYM, *kind.options, "--out", str(run)]
+        silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        for point in sorted(random.sample(range(1, kind.most), _KILLS)):
+            with subprocess.Popen(command, **silent) as process:  # type: ignore[call-overload]
+                while kind.progress(run) < point and process.poll() is None:
+                    time.sleep(0.002)
+                time.sleep(random.uniform(0, 0.1))
+                process.send_signal(signal.SIGKILL)
+        ended = subprocess.run(command, capture_output=True, text=True, check=False)
+        if ended.returncode:
+            yield f"{kind.options[0]} ended with {ended.returncode}: {ended.stderr[-300:]}"
+        else:
+            yield from kind.problems(run)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    run_check(check, __doc__)

@@ -14,17 +14,15 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import sys
 import tempfile
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.checks.pseudo_terminal import TerminalRun, run
-from benchmarks.checks.tally import Tally
+from benchmarks.harness.output import ROOT
+from benchmarks.harness.processes import ER_GYM, TerminalRun, run
+from benchmarks.harness.tally import Tally, Try, holds, run_check, tally
 
-ROOT = Path(__file__).resolve().parents[2]
 _CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f]")
 _SECONDS = 300.0
 
@@ -85,18 +83,11 @@ LINES = (
 )
 
 
-def main(words: Sequence[str]) -> int:
-    """Try all lines that hold the words; print the failures and their number."""
-    tally = check(words)
-    print(tally)
-    return int(tally.short > 0)
-
-
 def check(
     words: Sequence[str] = (),
     *,
     quick: bool = False,
-    command: Sequence[str] = (sys.executable, "-m", "benchmarks.cli"),
+    command: Sequence[str] = ER_GYM,
     checkout: bool = True,
 ) -> Tally:
     """Try all lines, or the quick ones, and print the failures.
@@ -107,19 +98,16 @@ def check(
         command: of er-gym.
         checkout: whether to try them in the checkout, too.
     """
-    began, tried, short = time.monotonic(), 0, 0
-    for line in LINES:
-        if (quick and not line.quick) or not all(word in line.words for word in words):
-            continue
+    chosen = (each for each in LINES if (each.quick or not quick) and holds(each.words, words))
+    return tally("terminal lines", _tries(chosen, command, checkout))
+
+
+def _tries(lines: Iterable[Line], command: Sequence[str], checkout: bool) -> Iterator[Try]:
+    for line in lines:
         for where, folder in _places(checkout):
             for terminal in (True, False):
-                tried += 1
-                problems = list(_problems(line, command, folder, terminal))
-                short += bool(problems)
                 how = f"{'with' if terminal else 'without'} a terminal, {where}"
-                for problem in problems:
-                    print(f"er-gym {line.words} ({how}): {problem}", flush=True)
-    return Tally("terminal lines", tried, short, time.monotonic() - began)
+                yield f"er-gym {line.words} ({how})", _problems(line, command, folder, terminal)
 
 
 def _places(checkout: bool) -> Iterator[tuple[str, Path]]:
@@ -182,4 +170,4 @@ def _is_json(text: str) -> bool:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    run_check(check, __doc__)

@@ -9,22 +9,19 @@ upper bound is concurrency / latency.
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import tempfile
-import threading
 import time
 from contextlib import closing, suppress
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
 
 import click
 
 from benchmarks.cli.executor import Workforce
 from benchmarks.cli.vlm_options import VLMOptions
 from benchmarks.cli.vlm_run import VLMRun
+from benchmarks.harness.chat_server import ChatServer, key_actions, replies
 from er_gym import __version__
 from er_gym.rollout.events import EpisodeEnded, Event
 from er_gym.rollout.machines import THIS_MACHINE
@@ -32,97 +29,12 @@ from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.tasks import Task, load_suite
 
 
-class KeyActionReplies:
-    """Replies with the next key action of a conversation's task."""
-
-    def __init__(self, tasks: list[Task]) -> None:
-        self._actions = {
-            task.instruction: [f"{key.verb} {key.actual_type}".strip() for key in task.key_actions]
-            for task in tasks
-        }
-
-    def __call__(self, messages: list[dict[str, Any]]) -> str:
-        first = next(message["content"] for message in messages if message["role"] == "user")
-        told = first if isinstance(first, str) else "".join(part.get("text", "") for part in first)
-        actions = next(
-            actions for instruction, actions in self._actions.items() if instruction in told
-        )
-        said = sum(message["role"] == "assistant" for message in messages)
-        action = actions[min(said, len(actions) - 1)]
-        return f"<Thinking>Next.</Thinking><DecisionMaking>{action}</DecisionMaking>"
-
-
-class Server(ThreadingHTTPServer):
-    """An OpenAI-compatible server that always replies, ``latency`` seconds after a request."""
-
-    daemon_threads = True
-    request_queue_size = 128
-
-    def __init__(
-        self,
-        replies: KeyActionReplies,
-        latency: float,
-        handler: type[BaseHTTPRequestHandler] | None = None,
-    ) -> None:
-        super().__init__(("127.0.0.1", 0), handler or Handler)
-        self.replies = replies
-        self.latency = latency
-
-    @property
-    def url(self) -> str:
-        """The address for ``--base-url``."""
-        return f"http://127.0.0.1:{self.server_port}/v1"
-
-
-class Handler(BaseHTTPRequestHandler):
-    """Replies to a request."""
-
-    server: Server
-    protocol_version = "HTTP/1.1"  # connections are kept
-    disable_nagle_algorithm = True
-
-    def do_POST(self) -> None:
-        arrived = time.monotonic()
-        asked = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-        said = self.server.replies(asked["messages"])
-        body = json.dumps(
-            {
-                "id": "answer",
-                "object": "chat.completion",
-                "created": int(time.time()),
-                "model": asked["model"],
-                "choices": [
-                    {
-                        "index": 0,
-                        "message": {"role": "assistant", "content": said},
-                        "finish_reason": "stop",
-                    }
-                ],
-                "usage": {"prompt_tokens": 100, "completion_tokens": 20, "total_tokens": 120},
-            }
-        ).encode()
-        time.sleep(max(0.0, self.server.latency - (time.monotonic() - arrived)))
-        self.send_response(200)
-        self.send_header("Content-Type", "application/json")
-        self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
-        self.answered(asked)
-
-    def answered(self, asked: dict[str, Any]) -> None:
-        """Called after each answer."""
-
-    def log_message(self, format: str, *args: object) -> None:
-        """Log nothing."""
-
-
 def serve(pipe: Connection, tasks: list[Task], latency: float) -> None:
     """The server's process."""
-    server = Server(KeyActionReplies(tasks), latency)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    pipe.send(server.url)
-    with suppress(EOFError):
-        pipe.recv()  # until the other end is closed
+    with ChatServer(replies(key_actions(tasks), latency=latency, keep=True)) as server:
+        pipe.send(server.url)
+        with suppress(EOFError):
+            pipe.recv()  # until the other end is closed
 
 
 @click.command()

@@ -15,21 +15,15 @@ from __future__ import annotations
 
 import os
 import statistics
-import sys
 import tempfile
-import time
 from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import click
 import torch
 import transformers
-from rich.console import Console
-from rich.table import Table
 from tokenizers import Tokenizer, decoders, models, pre_tokenizers, trainers
 from torch.profiler import ProfilerActivity, profile
 
@@ -39,6 +33,8 @@ from agents.finetune.samples import open_samples
 from agents.finetune.settings import DataSettings, load_settings
 from agents.finetune.tokens import EncodedChat, Encoder
 from agents.finetune.train import train
+from benchmarks.harness.measuring import timed
+from benchmarks.harness.output import print_table
 from er_gym.data.chat import Chat
 from er_gym.data.collection import Collection
 
@@ -55,26 +51,6 @@ PARTS = {
     "batches": ("enumerate(DataLoader)",),
 }
 """Parts of the time, and words in the names of what they consist of."""
-
-
-@dataclass(frozen=True)
-class Spent:
-    """Seconds by the clock and of processor time, for some multiplications.
-
-    Attributes:
-        work: additions and multiplications of numbers.
-        clock, processor: seconds.
-    """
-
-    work: float
-    clock: float
-    processor: float
-
-
-def timed(work: float, call: Callable[[], Any]) -> Spent:
-    clock, processor = time.perf_counter(), time.process_time()
-    call()
-    return Spent(work, time.perf_counter() - clock, time.process_time() - processor)
 
 
 def blind(collection: Collection, to: Path) -> Collection:
@@ -201,49 +177,50 @@ def main(
         product_work, multiply = products(model, rows)
         learn(1)
         multiply()
-        shares: defaultdict[str, list[float]] = defaultdict(list)
-        for _ in range(rounds):
+
+        def one_round() -> dict[str, float]:
             # What starting costs is the same for one pass and for more.
-            short, long = (timed(work * n, partial(learn, n)) for n in (1, 1 + epochs))
-            times = max(1, int(long.work / product_work / 4))
-            alone = timed(product_work * times, partial(repeat, multiply, times))
+            short, long = timed(partial(learn, 1)), timed(partial(learn, 1 + epochs))
+            times = max(1, int(work * (1 + epochs) / product_work / 4))
+            alone = timed(partial(repeat, multiply, times))
+            figures = {}
             for name in ("clock", "processor"):
-                into = (long.work - short.work) / (getattr(long, name) - getattr(short, name))
-                rate = alone.work / getattr(alone, name)
-                shares[f"{name}: training, GFLOP/s"].append(into / 1e9)
-                shares[f"{name}: matrix products, GFLOP/s"].append(rate / 1e9)
-                shares[f"{name}: share"].append(into / rate)
+                into = work * epochs / (getattr(long, name) - getattr(short, name))
+                rate = product_work * times / getattr(alone, name)
+                figures[f"{name}: training, GFLOP/s"] = into / 1e9
+                figures[f"{name}: matrix products, GFLOP/s"] = rate / 1e9
+                figures[f"{name}: share"] = into / rate
+            return figures
+
+        every = [one_round() for _ in range(rounds)]
         with profile(activities=[ProfilerActivity.CPU]) as seen:
             learn(epochs)
-    console = Console(width=None if sys.stdout.isatty() else 110)
     order = list(Order([chat.length for chat in chats], batch, 0, buckets=True))
     batches = [
         [chats[i].length for i in order[at : at + batch]] for at in range(0, len(order), batch)
     ]
     filled = sum(map(sum, batches)) / sum(max(each) * len(each) for each in batches)
-    console.print(
+    click.echo(
         f"{model.parameters / 1e6:.1f} M parameters, {len(chats)} conversations of "
         f"{rows // batch:,} tokens on average, {batch} in a batch, of which {1 - filled:.0%} "
         f"is padding; {threads} threads"
     )
-    table = Table(title=f"wanted: a share of at least {WANTED:.0%}")
-    table.add_column("what")
-    table.add_column("median", justify="right")
-    table.add_column("rounds", justify="right")
-    for name, values in shares.items():
+    table = []
+    for name in every[0]:
         form = "{:.0%}" if name.endswith("share") else "{:.1f}"
-        each = ", ".join(form.format(value) for value in values)
-        table.add_row(name, form.format(statistics.median(values)), each)
-    console.print(table)
+        values = [figures[name] for figures in every]
+        middle = form.format(statistics.median(values))
+        table.append((name, middle, ", ".join(map(form.format, values))))
+    print_table(f"wanted: a share of at least {WANTED:.0%}", ("what", "median", "rounds"), table)
     spent: defaultdict[str, float] = defaultdict(float)
     for event in seen.key_averages():
         spent[part_of(event.key)] += event.self_cpu_time_total
-    table = Table(title="where the time goes (the profiler's own included)")
-    table.add_column("part")
-    table.add_column("share", justify="right")
-    for name, value in sorted(spent.items(), key=lambda each: -each[1]):
-        table.add_row(name, f"{value / sum(spent.values()):.0%}")
-    console.print(table)
+    shares = sorted(spent.items(), key=lambda each: -each[1])
+    print_table(
+        "where the time goes (the profiler's own included)",
+        ("part", "share"),
+        ((name, f"{value / sum(spent.values()):.0%}") for name, value in shares),
+    )
 
 
 if __name__ == "__main__":

@@ -22,7 +22,6 @@ import platform
 import statistics
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
@@ -33,15 +32,14 @@ from typing import Any
 
 import click
 import numpy as np
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
 
-from benchmarks.checks.output import Output, write_figures
 from benchmarks.checks.scene_jobs import choose_scenes
 from benchmarks.checks.soak import free_play
+from benchmarks.harness.measuring import in_turns, per_second
+from benchmarks.harness.output import json_option, print_table, progress, write_figures
 from benchmarks.perf.steps import RandomPlayer
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.rollout.cluster.actors import resident_memory
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.scene_graph import scene_graph_of
 from er_gym.sim.scene import SCENE_NAMES, load_scene
@@ -115,12 +113,6 @@ class Memory:
     megabytes: float
 
 
-def resident_megabytes() -> float:
-    """Megabytes."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
 def cameras(world: World, size: tuple[int, int], random: np.random.Generator) -> list[Camera]:
     """Random poses where the agent can stand."""
     found, height = [], float(world.agent.camera[1])
@@ -141,13 +133,10 @@ class Pictures:
         )
         self._depth = depth
 
-    def per_second(self, seconds: float) -> float:
-        frames, start = 0, time.perf_counter()
-        while time.perf_counter() - start < seconds:
-            world, camera = next(self._poses)
-            scene_graph_of(world.scene.name).draw(world, camera, self._depth)
-            frames += 1
-        return frames / (time.perf_counter() - start)
+    def draw(self) -> None:
+        """The next one."""
+        world, camera = next(self._poses)
+        scene_graph_of(world.scene.name).draw(world, camera, self._depth)
 
 
 def environment(scenes: list[str], size: tuple[int, int]) -> EmbodiedEnv:
@@ -247,20 +236,18 @@ def _first_error(said: str) -> str:
     return (errors or lines or ["it said nothing"])[0]
 
 
-def available_renderers(scenes: list[str], console: Console) -> list[MuJoCo]:
-    """MuJoCo's renderers that run here; prints why the others do not."""
+def available_renderers(scenes: list[str]) -> list[MuJoCo]:
+    """MuJoCo's renderers that run here; says why the others do not."""
     if importlib.util.find_spec("mujoco") is None:
-        console.print("nothing to compare with: pip install mujoco", style="yellow")
+        click.echo("nothing to compare with: pip install mujoco", err=True)
         return []
     found = []
     for gl, packages in _MUJOCO_GL.items():
         try:
             MuJoCo(gl, False).per_second(scenes[:1], (64, 64), 0.1)
         except RuntimeError as error:
-            console.print(
-                f"MuJoCo's {gl} renderer does not run here ({error}): apt install {packages}",
-                style="yellow",
-            )
+            why = f"MuJoCo's {gl} renderer does not run here ({error}): apt install {packages}"
+            click.echo(why, err=True)
         else:
             found += [MuJoCo(gl, True), MuJoCo(gl, False)]
     return found
@@ -269,42 +256,38 @@ def available_renderers(scenes: list[str], console: Console) -> list[MuJoCo]:
 # -- what is measured ------------------------------------------------------------------------------
 
 
-def rates(scenes: list[str], rounds: int, seconds: float, console: Console) -> list[FrameRate]:
+def rates(scenes: list[str], rounds: int, seconds: float) -> list[FrameRate]:
     """Pictures and steps per second at each size, timed in turns."""
-    timers: dict[tuple[str, tuple[int, int]], Callable[[float], float]] = {}
+    ways: dict[tuple[str, tuple[int, int]], Callable[[], float]] = {}
     with ExitStack() as stack:
-        mujoco_renderers = available_renderers(scenes, console)
+        mujoco_renderers = available_renderers(scenes)
         for size in SIZES:
             env = environment(scenes, size)
             stack.callback(env.close)
             for depth in (False, True):
                 name = f"renderer: rgb, instances{', depth' if depth else ''}"
-                timers[name, size] = Pictures(scenes, size, depth).per_second
-            timers[STEP, size] = RandomPlayer([env], seed=0).steps_per_second
+                ways[name, size] = partial(per_second, Pictures(scenes, size, depth).draw, seconds)
+            ways[STEP, size] = partial(RandomPlayer([env], seed=0).steps_per_second, seconds)
             for renderer in mujoco_renderers:
-                timers[renderer.name, size] = partial(renderer.per_second, scenes, size)
-        found: dict[tuple[str, tuple[int, int]], list[float]] = {what: [] for what in timers}
-        for (name, _), timer in timers.items():
+                ways[renderer.name, size] = partial(renderer.per_second, scenes, size, seconds)
+        for (name, _), measure in ways.items():
             if "MuJoCo" not in name:  # load everything that is loaded only once
-                timer(seconds)
-        turns = [turn for _ in range(rounds) for turn in timers.items()]
-        for what, timer in track(turns, "rates", console=console, disable=not console.is_terminal):
-            found[what].append(timer(seconds))
+                measure()
+        found = in_turns(ways, rounds, "rates")
     return [
         FrameRate(name, size, statistics.median(values), tuple(values))
         for (name, size), values in found.items()
     ]
 
 
-def soak(console: Console) -> list[Memory]:
+def soak() -> list[Memory]:
     """How memory grows over many steps in a few scenes, and over changes between all scenes."""
     random = np.random.default_rng(0)
     few = choose_scenes(str(SCENES))
     env = environment(list(SCENE_NAMES), SIZES[1])
-    hidden = not console.is_terminal
 
     def play(scenes: list[str], steps: int) -> float:
-        for name in track(scenes, "soak", console=console, disable=hidden):
+        for name in progress(scenes, "soak"):
             _, info = env.reset(seed=0, options={"task": free_play(name)})
             for _ in range(steps):
                 _, _, ended, cut, info = env.step(
@@ -312,7 +295,7 @@ def soak(console: Console) -> list[Memory]:
                 )
                 if ended or cut:
                     _, info = env.reset(options={"task": free_play(name)})
-        return resident_megabytes()
+        return resident_memory() / 1e6
 
     found = [Memory(f"soak: {SCENES} scenes seen", play(few, 20))]
     for part in (1, 2):
@@ -329,47 +312,35 @@ def soak(console: Console) -> list[Memory]:
 # -- what is printed -------------------------------------------------------------------------------
 
 
-def show(figures: list[FrameRate], memory: list[Memory], console: Console) -> None:
+def show(figures: list[FrameRate], memory: list[Memory]) -> None:
     """Print the rates and the memory."""
+    found: dict[str, list[str]] = {}
+    for figure in figures:
+        found.setdefault(figure.name, []).append(f"{figure.value:.0f}")
+    rows = [(name, *values) for name, values in found.items()]
+    rows.append((f"wanted of {STEP}", *(f">= {wanted}" for wanted in STEPS_WANTED)))
     cores = f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}"
-    table = Table(title=f"pictures a second in one process ({cores})")
-    table.add_column("what")
-    for width, height in SIZES:
-        table.add_column(f"{width}×{height}", justify="right")
-    found = {(figure.name, figure.size): figure.value for figure in figures}
-    for name in dict.fromkeys(figure.name for figure in figures):
-        row = [f"{found[name, size]:.0f}" for size in SIZES]
-        table.add_row(name, *row)
-        if name == STEP:
-            table.add_row("  wanted", *(f">= {wanted}" for wanted in STEPS_WANTED), style="dim")
-    console.print(table)
-    table = Table(title="memory of the process (RSS)")
-    table.add_column("when")
-    table.add_column("MB", justify="right")
-    for entry in memory:
-        table.add_row(entry.name, f"{entry.megabytes:.0f}")
-    table.add_row("  wanted", f"<= {MEMORY_WANTED}", style="dim")
-    console.print(table)
+    sizes = ("{}×{}".format(*size) for size in SIZES)
+    print_table(f"pictures a second in one process ({cores})", ("what", *sizes), rows)
+    taken = [(entry.name, f"{entry.megabytes:.0f}") for entry in memory]
+    taken.append(("wanted", f"<= {MEMORY_WANTED}"))
+    print_table("memory of the process (RSS)", ("when", "MB"), taken)
 
 
 @click.command()
 @click.option("--seconds", default=3.0, show_default=True, type=click.FloatRange(0.1))
 @click.option("--rounds", default=3, show_default=True, type=click.IntRange(1))
 @click.option("--soak", "soaked", is_flag=True, help="Also check whether memory grows.")
-@click.option("--json", "file", type=Output())
+@json_option
 def main(seconds: float, rounds: int, soaked: bool, file: Path | None) -> None:
     """Measure, and print two tables."""
-    log = Console(stderr=True)
-    figures = rates(choose_scenes(str(SCENES)), rounds, seconds, log)
-    memory = [
-        Memory(f"{SCENES} scenes drawn and played at {len(SIZES)} sizes", resident_megabytes())
-    ]
+    figures = rates(choose_scenes(str(SCENES)), rounds, seconds)
+    name = f"{SCENES} scenes drawn and played at {len(SIZES)} sizes"
+    memory = [Memory(name, resident_memory() / 1e6)]
     if soaked:
-        memory += soak(log)
-    show(figures, memory, Console(width=None if sys.stdout.isatty() else 110))
-    if file is not None:
-        told = {"rates": list(map(asdict, figures)), "memory": list(map(asdict, memory))}
-        write_figures(file, told)
+        memory += soak()
+    show(figures, memory)
+    write_figures(file, {"rates": list(map(asdict, figures)), "memory": list(map(asdict, memory))})
 
 
 if __name__ == "__main__":

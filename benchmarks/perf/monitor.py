@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 import tempfile
 import time
 import urllib.parse
@@ -24,6 +23,8 @@ from typing import Any
 import click
 from PIL import Image
 
+from benchmarks.harness.measuring import timed
+from benchmarks.harness.processes import ER_GYM
 from benchmarks.monitor.places import Places
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import CONVERSATIONS, PICTURES, Manifest, RunDirectory
@@ -51,10 +52,8 @@ def make_run(run: Path, episodes: int, pictures: int) -> list[str]:
     """Write a large run directory; returns the names of its episodes."""
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "mini"
-        command = [sys.executable, "-m", "benchmarks.cli", "bench", "--suite", "mini"]
-        subprocess.run(
-            [*command, "--agent", "random", "--out", str(source)], check=True, capture_output=True
-        )
+        command = [*ER_GYM, "bench", "--suite", "mini", "--agent", "random", "--out", str(source)]
+        subprocess.run(command, check=True, capture_output=True)
         played = RunDirectory.open(source)
         records = list(played.episodes())
         lines = (source / "events.jsonl").read_bytes().splitlines(keepends=True)
@@ -133,7 +132,7 @@ def measure(run: Path, keys: list[str], pictures: int) -> None:
     """Start a server over a run, and tell how long its pages take."""
     begin = time.perf_counter()
     server = subprocess.Popen(
-        [sys.executable, "-m", "benchmarks.cli", "ui", str(run.parent), "--no-browser", "--port=0"],
+        [*ER_GYM, "ui", str(run.parent), "--no-browser", "--port=0"],
         stdout=subprocess.PIPE,
         text=True,
     )
@@ -164,10 +163,11 @@ def measure(run: Path, keys: list[str], pictures: int) -> None:
 
 
 def _seconds(address: str) -> float:
-    begin = time.perf_counter()
-    with urllib.request.urlopen(address) as answer:
-        answer.read()
-    return time.perf_counter() - begin
+    def ask() -> None:
+        with urllib.request.urlopen(address) as answer:
+            answer.read()
+
+    return timed(ask).clock
 
 
 def _tell(what: str, seconds: list[float]) -> None:

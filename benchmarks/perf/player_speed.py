@@ -11,17 +11,17 @@ programs.
 from __future__ import annotations
 
 import os
-import statistics
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
-from rich.console import Console
-from rich.table import Table
+
+from benchmarks.harness.measuring import in_turns
+from benchmarks.harness.output import print_table
 
 _TICK = os.sysconf("SC_CLK_TCK")
 _GOAL = 400.0
@@ -116,43 +116,45 @@ def main(seconds: float, rounds: int, width: int, height: int, server: str) -> N
     )
     ready = time.perf_counter() - start
     pid = controller.unity_pid
-    found: dict[str, list[Rate]] = {name: [] for name in STEPS}
-    for _ in range(rounds):
-        for name, requests in STEPS.items():
-            controller.reset(fastActionEmit="whole" not in name)
 
-            def step(requests: list[dict[str, Any]] = requests) -> None:
-                for request in requests:
-                    controller.step(**request, raise_for_failure=True)
+    def rate_of(name: str) -> Rate:
+        requests = STEPS[name]
+        controller.reset(fastActionEmit="whole" not in name)
 
-            rate = measure(step, pid, seconds)
-            each = len(requests)
-            found[name].append(Rate(rate.per_second * each, rate.client / each, rate.player / each))
+        def step() -> None:
+            for request in requests:
+                controller.step(**request, raise_for_failure=True)
+
+        rate, each = measure(step, pid, seconds), len(requests)
+        return Rate(rate.per_second * each, rate.client / each, rate.player / each)
+
+    found = in_turns({name: partial(rate_of, name) for name in STEPS}, rounds)
     controller.stop()
     medians = {name: _median(rates) for name, rates in found.items()}
     _show(medians, ready, server, f"{width}×{height}")
 
 
 def _median(rates: list[Rate]) -> Rate:
-    middle = statistics.median_low(rate.per_second for rate in rates)
-    return next(rate for rate in rates if rate.per_second == middle)
+    return sorted(rates, key=lambda rate: rate.per_second)[(len(rates) - 1) // 2]
 
 
 def _show(medians: dict[str, Rate], ready: float, server: str, size: str) -> None:
-    console = Console(width=None if sys.stdout.isatty() else 120)
-    cores = os.cpu_count()
-    table = Table(title=f"er-gym's player, FloorPlan1, {server.upper()}, {size}, {cores} cores")
-    for heading in ("step", "steps/s", "client ms", "player ms", "waiting ms", "bound by"):
-        table.add_column(heading, justify="left" if heading in ("step", "bound by") else "right")
-    for name, rate in medians.items():
-        times = (f"{value:.2f}" for value in (rate.client, rate.player, rate.waiting))
-        table.add_row(name, f"{rate.per_second:.0f}", *times, rate.bound)
-    console.print(table)
-    console.print(f"ready to step {ready:.2f} s after launch")
+    rows = [
+        (
+            name,
+            f"{rate.per_second:.0f}",
+            *(f"{value:.2f}" for value in (rate.client, rate.player, rate.waiting)),
+            rate.bound,
+        )
+        for name, rate in medians.items()
+    ]
+    notes = [f"ready to step {ready:.2f} s after launch"]
     if server == "fifo":  # the client limits WSGI
-        first = next(iter(medians.values()))
-        verdict = "reached" if first.per_second >= _GOAL else "MISSED"
-        console.print(f"goal of {_GOAL:.0f} Pass/s: {verdict}")
+        reached = next(iter(medians.values())).per_second >= _GOAL
+        notes.append(f"goal of {_GOAL:.0f} Pass/s: {'reached' if reached else 'MISSED'}")
+    title = f"er-gym's player, FloorPlan1, {server.upper()}, {size}, {os.cpu_count()} cores"
+    head = ("step", "steps/s", "client ms", "player ms", "waiting ms", "bound by")
+    print_table(title, head, rows, notes=notes)
 
 
 if __name__ == "__main__":

@@ -14,22 +14,19 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
-from benchmarks.checks.output import Output, write_figures
-from benchmarks.checks.pseudo_terminal import TerminalRun, run
-from benchmarks.perf.conversations import KeyActionReplies, Server
+from benchmarks.harness.chat_server import ChatServer, key_actions, replies
+from benchmarks.harness.output import ROOT, Output, write_figures
+from benchmarks.harness.processes import TerminalRun, plain_environment, run
 from er_gym.tasks.suites import load_suite
 
 FIRST, WITHIN = 1.0, 3.0
 """Seconds: what is allowed until the first word, and between two words."""
-ROOT = Path(__file__).resolve().parents[2]
 _SHAREGPT = "data export made --to sharegpt --out sharegpt"
 _INSTALL = "make -C REPO VENV=WORK/venv PYTHON=PYTHON WORK/venv/.er-gym-core"
 
@@ -141,7 +138,9 @@ def measure(row: Row, work: Path, python: Path, repo: Path, server: str) -> Term
     return run(
         _words(row, work, python, repo, server),
         cwd=work,
-        environment={"OPENAI_API_KEY": "none", "LOCAL_API_KEY": "none", "HF_HUB_OFFLINE": "1"},
+        environment=plain_environment(
+            OPENAI_API_KEY="none", LOCAL_API_KEY="none", HF_HUB_OFFLINE="1"
+        ),
         until=row.until,
         keys=row.keys,
         seconds=900,
@@ -161,15 +160,6 @@ def _words(row: Row, work: Path, python: Path, repo: Path, server: str) -> list[
     return words if words[0] == "make" else [str(python.parent / "er-gym"), *words]
 
 
-@contextmanager
-def _server() -> Iterator[str]:
-    """The address of a server that replies with the tasks' key actions."""
-    server = Server(KeyActionReplies(list(load_suite("mini").tasks)), 0.05)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield server.url
-    server.shutdown()
-
-
 @click.command()
 @click.argument("names", nargs=-1, metavar="[NAME]...", type=click.Choice(tuple(BY_NAME)))
 @click.option("--repo", type=click.Path(exists=True, path_type=Path), default=ROOT)
@@ -185,10 +175,11 @@ def main(names: tuple[str, ...], repo: Path, python: Path, out: Path | None) -> 
     figures: dict[str, dict[str, float]] = {}
     short = 0
     print(f"{'':16} {'first word':>10} {'silence':>8} {'in all':>7}  seconds")
-    with tempfile.TemporaryDirectory() as folder, _server() as server:
+    speaks = replies(key_actions(load_suite("mini").tasks), latency=0.05, keep=True)
+    with tempfile.TemporaryDirectory() as folder, ChatServer(speaks) as server:
         work = Path(folder)
         for row in in_order(names):
-            done = measure(row, work, python.absolute(), repo.resolve(), server)
+            done = measure(row, work, python.absolute(), repo.resolve(), server.url)
             failed = done.late or done.code not in row.code
             silence, followed = done.silence
             bad = failed or done.first > FIRST or silence > WITHIN
@@ -208,8 +199,7 @@ def main(names: tuple[str, ...], repo: Path, python: Path, out: Path | None) -> 
             elif silence > WITHIN:
                 print(f"    {silence:.2f} s after {followed[-80:]!r}")
     print(f"{short} of {len(figures)} say nothing for too long")
-    if out is not None:
-        write_figures(out, figures)
+    write_figures(out, figures)
     sys.exit(int(short > 0))
 
 

@@ -14,21 +14,20 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 import gymnasium
 import numpy as np
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
 
 import er_gym  # noqa: F401  (registers the environments)
-from benchmarks.checks.output import Output, write_figures
+from benchmarks.harness.measuring import in_turns
+from benchmarks.harness.output import json_option, print_table, write_figures
 from er_gym.tasks.types import TASK_TYPES
 from er_gym.thor import make_controller
 
@@ -138,7 +137,7 @@ def environments(**arguments: Any) -> Iterator[list[gymnasium.Env[Any, Any]]]:
         yield envs
 
 
-def step_rates(rounds: int, seconds: float, console: Console) -> list[Measurement]:
+def step_rates(rounds: int, seconds: float) -> list[Measurement]:
     """Steps per second of each variant and of MiniGrid, and reset times, timed in turns."""
     with ExitStack() as stack:
         # Each plays other episodes: the engine remembers what it has seen, for all in the process.
@@ -152,19 +151,19 @@ def step_rates(rounds: int, seconds: float, console: Console) -> list[Measuremen
             env = gymnasium.make(MINIGRID)
             stack.callback(env.close)
             players[MINIGRID] = RandomPlayer([env], seed=0)
-        rates: dict[str, list[float]] = {name: [] for name in players}
         for player in players.values():
             player.steps_per_second(min(0.3, seconds))  # load everything that is loaded only once
             player.resets.clear()
-        turns = [(name, player) for _ in range(rounds) for name, player in players.items()]
-        for name, player in track(turns, "steps", console=console, disable=not console.is_terminal):
-            rates[name].append(player.steps_per_second(seconds))
+        ways = {name: partial(each.steps_per_second, seconds) for name, each in players.items()}
+        rates = in_turns(ways, rounds, "steps")
     figures = [Measurement.of(f"steps, {name}", found, "steps/s") for name, found in rates.items()]
     for name in VARIANTS:
         times = 1000 * np.array(players[name].resets)
-        if len(times):
-            figures.append(Measurement(f"reset p50, {name}", float(np.percentile(times, 50)), "ms"))
-            figures.append(Measurement(f"reset p95, {name}", float(np.percentile(times, 95)), "ms"))
+        figures += [
+            Measurement(f"reset p{part}, {name}", float(np.percentile(times, part)), "ms")
+            for part in (50, 95)
+            if len(times)
+        ]
     return figures
 
 
@@ -183,18 +182,18 @@ def interactable_poses(rounds: int) -> Measurement:
     return Measurement.of(f"GetInteractablePoses at 0.25 m, {KITCHEN}'s objects, mean", found, "ms")
 
 
+def _fresh(program: str, obs_mode: str) -> list[float]:
+    """The numbers that a program prints in a new process."""
+    command = [sys.executable, "-c", program.format(obs_mode=obs_mode)]
+    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    return [float(word) for word in told.split()]
+
+
 def fresh_start(rounds: int) -> list[Measurement]:
     """Seconds to the first observation in a new process, import included."""
     figures = []
     for obs_mode in ("state", "rgb"):
-        found = []
-        for _ in range(rounds):
-            result = subprocess.run(
-                [sys.executable, "-c", _FRESH.format(obs_mode=obs_mode)],
-                check=True, capture_output=True, text=True,
-            )  # fmt: skip
-            found.append([float(word) for word in result.stdout.split()])
-        imported, ready = zip(*found, strict=True)
+        imported, ready = zip(*(_fresh(_FRESH, obs_mode) for _ in range(rounds)), strict=True)
         if obs_mode == "state":
             figures.append(Measurement.of("fresh process: import", list(imported), "s"))
         name = f"fresh process: import, make, reset, first observation ({obs_mode})"
@@ -206,55 +205,39 @@ def resident_memory() -> list[Measurement]:
     """The memory of a new process with one environment after 50 steps."""
     figures = []
     for obs_mode in ("state", "rgb"):
-        result = subprocess.run(
-            [sys.executable, "-c", _RESIDENT.format(obs_mode=obs_mode)],
-            check=True, capture_output=True, text=True,
-        )  # fmt: skip
-        pages = int(result.stdout) * os.sysconf("SC_PAGE_SIZE")
+        (pages,) = _fresh(_RESIDENT, obs_mode)
         name = f"resident memory, one environment ({obs_mode})"
-        figures.append(Measurement(name, pages / 2**20, "MiB"))
+        figures.append(Measurement(name, pages * os.sysconf("SC_PAGE_SIZE") / 2**20, "MiB"))
     return figures
 
 
-def show(figures: list[Measurement], console: Console) -> None:
+def show(figures: list[Measurement]) -> None:
     """Print the one table."""
-    table = Table(title=f"er-gym, {os.cpu_count()} cores, Python {sys.version.split()[0]}")
-    table.add_column("what")
-    table.add_column("median", justify="right")
-    table.add_column("unit")
-    table.add_column("rounds", justify="right", style="dim")
+    rows = []
     for figure in figures:
         digits = 0 if figure.value >= 100 else 2
         rounds = "  ".join(f"{value:.{digits}f}" for value in figure.rounds)
-        table.add_row(figure.name, f"{figure.value:.{digits}f}", figure.unit, rounds)
-    console.print(table)
+        rows.append((figure.name, f"{figure.value:.{digits}f}", figure.unit, rounds))
+    title = f"er-gym, {os.cpu_count()} cores, Python {sys.version.split()[0]}"
+    there = any(MINIGRID in figure.name for figure in figures)
+    missing = (
+        "MiniGrid is not installed, so there is nothing to compare with: pip install -e '.[dev]'"
+    )
+    notes = [] if there else [missing]
+    print_table(title, ("what", "median", "unit", "rounds"), rows, notes=notes)
 
 
 @click.command()
 @click.option("--seconds", default=4.0, show_default=True, type=click.FloatRange(0.01))
 @click.option("--rounds", default=3, show_default=True, type=click.IntRange(1))
-@click.option("--json", "file", type=Output())
+@json_option
 def main(seconds: float, rounds: int, file: Path | None) -> None:
     """Measure, and print one table."""
-    console = Console(width=None if sys.stdout.isatty() else 140)
-    figures = step_rates(rounds, seconds, Console(stderr=True))
-    parts: list[Callable[[], list[Measurement]]] = [
-        lambda: [interactable_poses(rounds)],
-        lambda: fresh_start(rounds),
-        resident_memory,
-    ]
-    for part in parts:
-        figures.extend(part())
-    show(figures, console)
-    if not any(MINIGRID in figure.name for figure in figures):
-        console.print(
-            "MiniGrid is not installed, so there is nothing to compare with: "
-            "pip install -e '.[dev]'",
-            markup=False,
-            style="yellow",
-        )
-    if file is not None:
-        write_figures(file, [asdict(figure) for figure in figures])
+    figures = step_rates(rounds, seconds)
+    figures.append(interactable_poses(rounds))
+    figures += fresh_start(rounds) + resident_memory()
+    show(figures)
+    write_figures(file, [asdict(figure) for figure in figures])
 
 
 if __name__ == "__main__":

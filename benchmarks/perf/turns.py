@@ -10,10 +10,10 @@ the model says ends at ``--tokens``, so that models with random weights will do.
 from __future__ import annotations
 
 import statistics
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import click
@@ -25,6 +25,7 @@ from agents.vlm.factory import load_settings, settings_file
 from agents.vlm.pictures import encode
 from agents.vlm.settings import AgentSettings
 from benchmarks.cli.options import agent_config_option, overrides_option
+from benchmarks.harness.measuring import Spent, in_turns, timed
 
 _WORDS = "see CounterTop ( Apple, Mug away, Bread far ), Fridge closed, Cabinet open ( Plate ). "
 
@@ -51,35 +52,35 @@ def main(
     """Measure, and print."""
     given = ("sampling.max_tokens=" + str(tokens), *overrides)
     settings = load_settings(agent_config, given, settings_file(f"hf:{model}"))
-    seconds: dict[bool, list[float]] = {False: [], True: []}
-    busy: dict[bool, list[float]] = {False: [], True: []}
-    replies: dict[bool, list[str]] = {False: [], True: []}
-    for number in range(rounds):
-        for reuse in (False, True) if number % 2 else (True, False):
-            local = settings.local.model_copy(update={"reuse": reuse})
-            client = LocalClient(model, settings.model_copy(update={"local": local}))
-            with closing(client):
-                _played(client, settings, 1, 2, size)  # the first request is slower
-                began, before = time.perf_counter(), time.process_time()
-                replies[reuse] = list(_played(client, settings, conversations, turns, size))
-                seconds[reuse].append(time.perf_counter() - began)
-                busy[reuse].append(time.process_time() - before)
+    replies: dict[bool, list[str]] = {}
+
+    def answer(reuse: bool) -> Spent:
+        local = settings.local.model_copy(update={"reuse": reuse})
+        with closing(LocalClient(model, settings.model_copy(update={"local": local}))) as client:
+            _played(client, settings, 1, 2, size)  # the first request is slower
+
+            def play() -> None:
+                replies[reuse] = _played(client, settings, conversations, turns, size)
+
+            return timed(play)
+
+    spent = in_turns({reuse: partial(answer, reuse) for reuse in (False, True)}, rounds)
     decisions = conversations * turns
-    for reuse, times in seconds.items():
-        middle = statistics.median(times)
-        each = ", ".join(f"{one:.1f}" for one in times)
+    clock, processor = (
+        {reuse: statistics.median(getattr(one, name) for one in spent[reuse]) for reuse in spent}
+        for name in ("clock", "processor")
+    )
+    for reuse, found in spent.items():
+        each = ", ".join(f"{one.clock:.1f}" for one in found)
         click.echo(
-            f"reuse {'on ' if reuse else 'off'}: {decisions} replies in {middle:.1f} s ({each}): "
-            f"{decisions / middle:.2f} replies/s, {statistics.median(busy[reuse]):.1f} s of the "
+            f"reuse {'on ' if reuse else 'off'}: {decisions} replies in {clock[reuse]:.1f} s "
+            f"({each}): {decisions / clock[reuse]:.2f} replies/s, {processor[reuse]:.1f} s of the "
             "processor"
         )
     alike = sum(one == other for one, other in zip(*replies.values(), strict=True))
-    faster, lighter = (
-        statistics.median(times[False]) / statistics.median(times[True])
-        for times in (seconds, busy)
-    )
     click.echo(
-        f"{faster:.2f} times as fast, {lighter:.2f} times by the processor's seconds; "
+        f"{clock[False] / clock[True]:.2f} times as fast, "
+        f"{processor[False] / processor[True]:.2f} times by the processor's seconds; "
         f"{alike} of {decisions} replies are the same; {Path(model).name}"
     )
 
@@ -90,7 +91,7 @@ def _played(
     conversations: int,
     turns: int,
     size: tuple[int, int],
-) -> Iterator[str]:
+) -> list[str]:
     """The replies of all conversations, each of which is played in a thread of its own."""
 
     def play(number: int) -> list[str]:
@@ -101,7 +102,7 @@ def _played(
         return [str(message.parts[0]) for message in talk[1::2]]
 
     with ThreadPoolExecutor(conversations) as pool:
-        return (reply for said in list(pool.map(play, range(conversations))) for reply in said)
+        return [reply for said in pool.map(play, range(conversations)) for reply in said]
 
 
 def _told(settings: AgentSettings, number: int, turn: int, size: tuple[int, int]) -> Message:

@@ -8,11 +8,11 @@ import sys
 import pytest
 from support import ROOT
 
-from benchmarks.checks.pseudo_terminal import run
 from benchmarks.cli import activity, live_line
 from benchmarks.cli.activity import doing, saying_what_it_does
 from benchmarks.cli.live_line import Line
 from benchmarks.cli.progress import bar
+from benchmarks.harness.processes import run
 from benchmarks.terminal import echo, terminal
 from er_gym.activity import LOG, begin, begin_import
 

@@ -11,21 +11,19 @@ processors. Prints the failures; the exit code is 1 if there is one.
 
 from __future__ import annotations
 
-import argparse
 import shutil
-import signal
-import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+import click
+
 from benchmarks.checks.doc_blocks.blocks import Block, Part, blocks
-from benchmarks.checks.doc_blocks.readers import ROOT
 from benchmarks.checks.doc_blocks.run import Ended, environment, run
 from benchmarks.checks.doc_blocks.table import NEVER, SLOW, reason, stale
 from benchmarks.checks.doc_blocks.warm import Warm, warm
-from benchmarks.checks.tally import Tally
+from benchmarks.harness.output import ROOT
+from benchmarks.harness.tally import Tally, Try, end, end_on_sigterm, tally
 
 _COLLECTION = "er-gym collect --suite train --limit 12 --out data/x"
 _SHAREGPT = (
@@ -46,31 +44,23 @@ LIGHT_SECONDS, SECONDS = 120.0, 1_800.0
 """After which a block is killed, on a busy machine."""
 
 
-def check(
-    names: Sequence[str] = (),
-    *,
-    light: bool = False,
-    timed: bool = False,
-    say: Callable[[str], None] = print,
-) -> Tally:
+def check(names: Sequence[str] = (), *, light: bool = False, timed: bool = False) -> Tally:
     """Run the blocks of pages, of all if none is named, and say what failed.
 
     Args:
         names: pages, such as ``docs/tasks.md``.
         light: whether what is slow is left out, too.
         timed: whether the seconds of each block are said, too.
-        say: takes each failure, in a few lines.
     """
-    began, tried, short = time.monotonic(), 0, 0
+    return tally("doc blocks", _tries(names, light, timed))
+
+
+def _tries(names: Sequence[str], light: bool, timed: bool) -> Iterator[Try]:
     with tempfile.TemporaryDirectory(prefix="doc-blocks-") as directory:
         for ended in run_pages(Path(directory), names, light=light):
-            tried += 1
             if timed:
-                say(f"{ended.place}: {ended.seconds:.1f} s")
-            if ended.problem:
-                short += 1
-                say(f"{ended.place}: {ended.problem}")
-    return Tally("doc blocks", tried, short, time.monotonic() - began)
+                click.echo(f"{ended.place}: {ended.seconds:.1f} s")
+            yield ended.place, [ended.problem] if ended.problem else []
 
 
 def run_pages(folder: Path, names: Sequence[str] = (), *, light: bool = False) -> Iterator[Ended]:
@@ -100,32 +90,24 @@ def _prepared(page: str, place: Path, started: Warm) -> Iterator[Ended]:
         yield from (ended for ended in run([made], place, started, lambda _: False, SECONDS))
 
 
-def main() -> int:
-    """Run the blocks, or print those that are not run."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("pages", nargs="*", metavar="PAGE", help="such as docs/tasks.md")
-    parser.add_argument("--light", action="store_true", help="only what the tests run")
-    parser.add_argument("--list", action="store_true", help="print what is not run, and why")
-    parser.add_argument("--times", action="store_true", help="print the seconds of each block")
-    given = parser.parse_args()
+@click.command(help=f"\b\n{__doc__}")
+@click.argument("pages", nargs=-1, metavar="[PAGE]...")
+@click.option("--light", is_flag=True, help="Only what the tests run.")
+@click.option("--list", "listed", is_flag=True, help="Print what is not run, and why.")
+@click.option("--times", is_flag=True, help="Print the seconds of each block.")
+def main(pages: tuple[str, ...], light: bool, listed: bool, times: bool) -> None:
     every = blocks(ROOT)
-    if unknown := {*given.pages} - {block.page for block in every}:
-        parser.error(f"{min(unknown)} is no page with a block")
+    if unknown := {*pages} - {block.page for block in every}:
+        raise click.UsageError(f"{min(unknown)} is no page with a block")
     parts = [part for block in every for part in block.parts]
-    for row in stale(parts):
-        print(f"table.py: no part begins so: {row}")
-    if given.list:
-        _print_reasons(parts, given.pages)
-        return 0
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
-    tally = check(
-        given.pages,
-        light=given.light,
-        timed=given.times,
-        say=lambda text: print(text, flush=True),
-    )
-    print(tally)
-    return int(tally.short > 0 or bool(stale(parts)))
+    rows = stale(parts)
+    for row in rows:
+        click.echo(f"table.py: no part begins so: {row}")
+    if listed:
+        _print_reasons(parts, pages)
+        return
+    end_on_sigterm()
+    end(check(pages, light=light, timed=times) + Tally("stale rows", short=len(rows)))
 
 
 def _print_reasons(parts: Sequence[Part], pages: Sequence[str]) -> None:
@@ -133,8 +115,8 @@ def _print_reasons(parts: Sequence[Part], pages: Sequence[str]) -> None:
         for part in parts:
             why = reason(part, of=(table,))
             if why and (not pages or part.page in pages):
-                print(f"{part.place}: {what}: {why}: {part.text.splitlines()[0][:100]}")
+                click.echo(f"{part.place}: {what}: {why}: {part.text.splitlines()[0][:100]}")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -8,8 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from benchmarks.checks.doc_blocks.blocks import Part
-
-ROOT = Path(__file__).resolve().parents[3]
+from benchmarks.harness.output import ROOT
 
 
 def _settings(text: str, folder: Path) -> None:

@@ -6,11 +6,8 @@ nothing else.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import shlex
-import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -18,8 +15,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.checks.doc_blocks.blocks import PYTHON, SHELL, Block, Part
-from benchmarks.checks.doc_blocks.readers import ROOT, reader
+from benchmarks.checks.doc_blocks.readers import reader
 from benchmarks.checks.doc_blocks.warm import Warm
+from benchmarks.harness import processes
+from benchmarks.harness.output import ROOT
 
 _AT = "DOC_BLOCKS_AT "
 
@@ -102,33 +101,22 @@ def _script(parts: Sequence[Part]) -> str:
 
 def _ran(command: Sequence[str], folder: Path, started: Warm, seconds: float) -> tuple[str, str]:
     """Where a command failed, if it says so, and what it then said."""
-    process = subprocess.Popen(
+    done = processes.run(
         command,
         cwd=folder,
-        env=dict(started.environment),
-        pass_fds=[started.handle],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        errors="replace",
-        start_new_session=True,
+        terminal=False,
+        environment=started.environment,
+        seconds=seconds,
+        handles=[started.handle],
     )
-    try:
-        said, _ = process.communicate(timeout=seconds)
-        why = f"ended with {process.returncode}"
-    except subprocess.TimeoutExpired:
-        said, why = "", f"did not end in {seconds:.0f} s"
-    finally:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
-    told = said.splitlines()
-    places = [line.removeprefix(_AT) for line in told if line.startswith(_AT)]
-    if process.returncode == 0:
+    if done.late:
+        return "", f"did not end in {seconds:.0f} s"
+    if done.code == 0:
         return "", ""
+    told = done.text().splitlines()
+    places = [line.removeprefix(_AT) for line in told if line.startswith(_AT)]
     last = [line for line in told if not line.startswith(_AT)][-6:]
-    return (places or [""])[-1], "\n  ".join([why, *last])
+    return (places or [""])[-1], "\n  ".join([f"ended with {done.code}", *last])
 
 
 def _read(block: Block, folder: Path) -> str:

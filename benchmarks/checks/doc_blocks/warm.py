@@ -14,7 +14,6 @@ import importlib
 import json
 import os
 import selectors
-import signal
 import socket
 import subprocess
 import sys
@@ -22,6 +21,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from benchmarks.harness.processes import end_group
 
 _SOCKET = "DOC_BLOCKS_SOCKET"
 _LONGEST = 1 << 17
@@ -119,7 +120,7 @@ def _serve(server: socket.socket) -> tuple[list[str], str, dict[str, str]] | Non
             for key, _ in waiting.select():
                 if key.data is None:
                     for pid, _ in running.values():
-                        _kill(pid)
+                        end_group(pid)
                     return None
                 if key.data is server:
                     request = _accepted(server, waiting, running)
@@ -128,7 +129,7 @@ def _serve(server: socket.socket) -> tuple[list[str], str, dict[str, str]] | Non
                 elif key.fd in running:
                     _ended(key.fd, waiting, running)
                 elif key.fileobj.recv(1) == b"":  # type: ignore[union-attr]
-                    _kill(key.data)  # the shell's er-gym was killed
+                    end_group(key.data)  # the shell's er-gym was killed
                     waiting.unregister(key.fileobj)
 
 
@@ -168,11 +169,6 @@ def _ended(
     with contextlib.suppress(OSError):
         answer.send(str(os.waitstatus_to_exitcode(status)).encode())
     answer.close()
-
-
-def _kill(pid: int) -> None:
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(pid, signal.SIGKILL)
 
 
 if __name__ == "__main__":

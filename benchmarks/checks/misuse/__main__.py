@@ -1,8 +1,7 @@
 """``python -m benchmarks.checks.misuse``."""
 
-import sys
-
-from benchmarks.checks.misuse import main
+from benchmarks.checks import misuse
+from benchmarks.harness.tally import run_check
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    run_check(misuse.check, misuse.__doc__)

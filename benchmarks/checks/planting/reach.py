@@ -19,9 +19,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmarks.checks.planting.faults import Fault
+from benchmarks.harness.output import ROOT
+from benchmarks.harness.processes import end_group, members
 
 _FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
-_ROOT = Path(__file__).resolve().parents[3]
 _SETTINGS = """
 [run]
 source = {package}
@@ -153,7 +154,7 @@ def run_tests(
             cwd=checkout,
             env={
                 **os.environ,
-                "PYTHONPATH": f"{checkout}{os.pathsep}{_ROOT}",
+                "PYTHONPATH": f"{checkout}{os.pathsep}{ROOT}",
                 "PYTHONDONTWRITEBYTECODE": "1",
                 # The tests' own limits are on the wall clock: on a busy machine they would notice
                 # what is no fault.
@@ -170,8 +171,7 @@ def run_tests(
         try:
             output = _said(process)
         finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
+            end_group(process.pid)
             process.wait()
     code = process.returncode
     late = code in (-signal.SIGXCPU, -signal.SIGKILL)
@@ -186,18 +186,10 @@ def _said(process: subprocess.Popen[str]) -> str:
         try:
             return process.communicate(timeout=_LOOK)[0]
         except subprocess.TimeoutExpired:
-            idle = 0 if _is_busy(process.pid) else idle + 1
+            # a process that runs, or waits for a processor or a disk
+            busy = any(state in "RD" for _, state in members(process.pid))
+            idle = 0 if busy else idle + 1
     return ""
-
-
-def _is_busy(session: int) -> bool:
-    """Whether any process of a session runs, or waits for a processor or a disk."""
-    for status in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):
-            state, _, _, its_session = status.read_text().rpartition(") ")[2].split()[:4]
-            if int(its_session) == session and state in "RD":
-                return True
-    return False
 
 
 def failing_of(checkout: Path, tests: Sequence[str]) -> set[str]:

@@ -20,8 +20,9 @@ from small_suite import NAME, small
 
 from agents.expert.decider import Deciders, DecidingAgent
 from benchmarks.checks.expert_server import collect_with_faults, wrong_thoughts
-from benchmarks.checks.scripted_expert import ScriptedExpert, answers, good, scripted_expert
+from benchmarks.checks.scripted_expert import answers, good, scripted_expert
 from benchmarks.cli.main import cli
+from benchmarks.harness.chat_server import ChatServer
 from er_gym.data.collection import Collection
 from er_gym.data.trajectory import Trajectory
 
@@ -43,7 +44,7 @@ def trajectories(out: Path) -> list[Trajectory]:
 
 
 @pytest.fixture
-def server() -> Iterator[ScriptedExpert]:
+def server() -> Iterator[ChatServer]:
     """A model that does as it is asked."""
     with scripted_expert() as one:
         yield one
@@ -67,7 +68,7 @@ def test_eight_trajectories_with_a_server_that_misbehaves(tmp_path: Path) -> Non
     assert {"leak", "missing", "tags"} <= set(outcome.refusals)
 
 
-def test_what_will_not_be_taken_costs_nothing(tmp_path: Path, server: ScriptedExpert) -> None:
+def test_what_will_not_be_taken_costs_nothing(tmp_path: Path, server: ChatServer) -> None:
     result = with_expert(server.url, tmp_path, "--limit", "3", "--types", "pickup_and_put")
     assert result.return_value == 0, result.output
     taken = trajectories(tmp_path)
@@ -81,7 +82,7 @@ def test_what_will_not_be_taken_costs_nothing(tmp_path: Path, server: ScriptedEx
 
 
 def test_the_manifest_states_the_model_and_no_secret(
-    tmp_path: Path, server: ScriptedExpert, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, server: ChatServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret")
     more = ("--limit", "1", "--types", "single_search", "--places", "model")
@@ -139,9 +140,7 @@ def test_options_that_do_not_go_together(
     assert not list((tmp_path / "x").glob("*.json"))  # the directory is free for the next try
 
 
-def test_a_model_that_decides_with_the_plan_as_a_hint(
-    tmp_path: Path, server: ScriptedExpert
-) -> None:
+def test_a_model_that_decides_with_the_plan_as_a_hint(tmp_path: Path, server: ChatServer) -> None:
     more = ("--limit", "4", "--decisions", "model", "--hint", "plan")
     result = with_expert(server.url, tmp_path, *more)
     assert result.return_value == 0, result.output
@@ -163,7 +162,7 @@ def test_with_strict_thoughts_a_lie_is_not_taken(tmp_path: Path) -> None:
         return good(messages).replace("<Planning>", lie)
 
     more = ("--limit", "1", "--types", "single_search", "--decisions", "model", "--hint", "plan")
-    with ScriptedExpert(answers(liar)) as server:
+    with ChatServer(answers(liar)) as server:
         with_expert(server.url, tmp_path, *more)
     (one,) = trajectories(tmp_path)
     assert all("unseen" in thought.refused for turn in one.turns for thought in turn.thoughts)
@@ -181,7 +180,7 @@ def test_an_action_that_was_refused_is_not_learnt_from(tmp_path: Path) -> None:
         return good([*messages[:2], *messages[4:]])
 
     more = ("--limit", "1", "--types", "single_search", "--decisions", "model", "--hint", "plan")
-    with ScriptedExpert(answers(clumsy)) as server:
+    with ChatServer(answers(clumsy)) as server:
         result = with_expert(server.url, tmp_path, *more)  # no room of the suite has a fridge
     assert result.return_value == 0, result.output
     (one,) = trajectories(tmp_path)
@@ -199,7 +198,7 @@ def test_a_recorded_run_becomes_trajectories(tmp_path: Path) -> None:
         return f"{thought}<DecisionMaking>{actions[done]}</DecisionMaking>"
 
     run = tmp_path / "run"
-    with ScriptedExpert(answers(knows)) as server:
+    with ChatServer(answers(knows)) as server:
         command = [
             "bench", "--suite", NAME, "--task-ids", task.id, "--agent", "openai:scripted",
             "--base-url", server.url, "--out", str(run), *SMALL,

@@ -271,7 +271,8 @@ def test_corrections_of_samples_begin_differently(run: Path) -> None:
 
 def test_a_models_thoughts_are_its_own(tmp_path: Path) -> None:
     pytest.importorskip("openai", reason="needs the extra vlm")
-    from benchmarks.checks.scripted_expert import Messages, ScriptedExpert, answers, text_of
+    from benchmarks.checks.scripted_expert import answers
+    from benchmarks.harness.chat_server import ChatServer, Messages, text_of
 
     tasks = {task.instruction: task for task in load_suite("mini").tasks if task.id in TASKS[:2]}
     numbers = {instruction: count(1) for instruction in tasks}
@@ -294,7 +295,7 @@ def test_a_models_thoughts_are_its_own(tmp_path: Path) -> None:
         return f"{speech} Fine, let me do that.\n<DecisionMaking>{action}</DecisionMaking>"
 
     run, out = tmp_path / "run", tmp_path / "x"
-    with ScriptedExpert(answers(play)) as server:
+    with ChatServer(answers(play)) as server:
         done(
             "bench", "--suite", "mini", "--agent", "openai:scripted", "--base-url", server.url,
             "--task-ids", ",".join(TASKS[:2]), "--samples", 4, "--concurrency", 1, "--out", run,

@@ -1,4 +1,7 @@
-"""Runs a command in a pseudo-terminal, or without one, and says when it printed what."""
+"""Runs a command in a pseudo-terminal, or without one, and says when it printed what.
+
+Also: the command ``er-gym`` of this checkout, and the processes of a session.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +14,15 @@ import selectors
 import signal
 import struct
 import subprocess
+import sys
 import termios
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+ER_GYM = (sys.executable, "-m", "benchmarks.cli")
+"""The command of this checkout."""
 ROWS, COLUMNS = 40, 100
 _ESCAPES = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\\)|[@-Z\\-_=>78])")
 _GRACE = 20.0
@@ -52,15 +58,17 @@ class TerminalRun:
         seconds: from its start to its end, or until it said what was waited for.
         said: all that it printed, in order.
         late: whether it had to be ended, since it took longer than allowed.
+        ending: seconds from Ctrl-C to its end; 0 if none was sent.
     """
 
     code: int = 0
     seconds: float = 0.0
+    ending: float = 0.0
     said: list[Said] = field(default_factory=list)
     late: bool = False
 
     def text(self, stream: str = "") -> str:
-        """All text of a stream, or of both, without control codes."""
+        """All text of a stream, or of both in order, without control codes."""
         told = (each.text for each in self.said if stream in ("", each.stream))
         return _ESCAPES.sub("", "".join(told)).replace("\r\n", "\n")
 
@@ -97,24 +105,24 @@ def run(
     until: str = "",
     keys: str = "",
     seconds: float = 300.0,
+    handles: Sequence[int] = (),
 ) -> TerminalRun:
-    """Run a command to its end.
+    """Run a command to its end, and end what it started and left behind.
 
     Args:
         argv: the command.
         cwd: where.
         terminal: whether its input and output are a pseudo-terminal; without one, the input is
             empty and the outputs are pipes.
-        environment: variables beside this process's.
+        environment: all its variables; :func:`plain_environment` by default.
         until: a regular expression; once the output has it, Ctrl-C is sent. For servers.
         keys: what is typed at once.
         seconds: after these it is killed.
+        handles: file descriptors that stay open in it.
     """
-    variables = {**os.environ, "TERM": "xterm-256color", **(environment or {})}
-    for name in ("COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR"):
-        variables.pop(name, None)
+    variables = plain_environment() if environment is None else environment
     start = time.monotonic()
-    process, streams = _start(argv, cwd, variables, keys, terminal)
+    process, streams = _start(argv, cwd, variables, keys, terminal, handles)
     done = TerminalRun()
     wanted = re.compile(until) if until else None
     try:
@@ -136,61 +144,89 @@ def run(
                     done.said.append(Said(time.monotonic() - start, key.data, text))
                 if wanted and not interrupted and wanted.search(done.text()):
                     done.seconds = interrupted = time.monotonic() - start
-                    _end(process, signal.SIGINT)
+                    end_group(process.pid, signal.SIGINT)
     finally:
         if process.poll() is None and not done.late:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(_GRACE)
         if process.poll() is None:
             done.late = True
-        _end(process, signal.SIGKILL)
+        end_group(process.pid)
         done.code = process.wait()
         for descriptor in streams:
             os.close(descriptor)
-    done.seconds = done.seconds or time.monotonic() - start
+    whole = time.monotonic() - start
+    done.ending = whole - done.seconds if done.seconds else 0.0
+    done.seconds = done.seconds or whole
     return done
 
 
+def plain_environment(**more: str) -> dict[str, str]:
+    """This process's variables without those that decide how a command prints, and some more."""
+    left_out = ("COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR")
+    kept = {name: value for name, value in os.environ.items() if name not in left_out}
+    return {**kept, "TERM": "xterm-256color", **more}
+
+
+def end_group(leader: int, number: int = signal.SIGKILL) -> None:
+    """Send a signal to a command and all that it started, if there is any of it."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(leader, number)
+
+
+def kill(pid: int) -> None:
+    """Kill a process by SIGKILL; nothing happens if it has ended."""
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(pid, signal.SIGKILL)
+
+
+def members(session: int) -> Iterator[tuple[int, str]]:
+    """The processes of a session and their states, as ``/proc`` names them; without zombies."""
+    for file in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            pid, _, rest = file.read_text().partition(" (")
+            state, _, _, its_session, *_ = rest.rpartition(") ")[2].split()
+            if int(its_session) == session and state not in "ZX":
+                yield int(pid), state
+
+
 def _start(
-    argv: Sequence[str], cwd: Path, variables: Mapping[str, str], keys: str, terminal: bool
+    argv: Sequence[str],
+    cwd: Path,
+    variables: Mapping[str, str],
+    keys: str,
+    terminal: bool,
+    handles: Sequence[int],
 ) -> tuple[subprocess.Popen[bytes], dict[int, str]]:
     """The process, and what to read its outputs from."""
+    if terminal:
+        ours, theirs = pty.openpty()
+        fcntl.ioctl(ours, termios.TIOCSWINSZ, struct.pack("HHHH", ROWS, COLUMNS, 0, 0))
+        read, ends = {ours: "out"}, [theirs, theirs, theirs]
+    else:
+        (out, theirs_out), (err, theirs_err) = os.pipe(), os.pipe()
+        nothing = os.open(os.devnull, os.O_RDONLY)
+        read, ends = {out: "out", err: "err"}, [nothing, theirs_out, theirs_err]
     made: Callable[..., subprocess.Popen[bytes]] = subprocess.Popen
-    if not terminal:
-        out, theirs_out = os.pipe()
-        err, theirs_err = os.pipe()
-        process = made(
-            argv,
-            cwd=cwd,
-            env=variables,
-            stdin=subprocess.DEVNULL,
-            stdout=theirs_out,
-            stderr=theirs_err,
-            start_new_session=True,
-            preexec_fn=_obey_ctrl_c,
-        )
-        os.close(theirs_out)
-        os.close(theirs_err)
-        return process, {out: "out", err: "err"}
-    ours, theirs = pty.openpty()
-    fcntl.ioctl(ours, termios.TIOCSWINSZ, struct.pack("HHHH", ROWS, COLUMNS, 0, 0))
     process = made(
         argv,
         cwd=cwd,
         env=variables,
-        stdin=theirs,
-        stdout=theirs,
-        stderr=theirs,
+        stdin=ends[0],
+        stdout=ends[1],
+        stderr=ends[2],
+        pass_fds=handles,
         start_new_session=True,
-        preexec_fn=_take_terminal,
+        preexec_fn=_take_terminal if terminal else _obey_ctrl_c,
     )
-    os.close(theirs)
-    if keys:  # not shown, so that what the command says comes first
+    for descriptor in {*ends}:
+        os.close(descriptor)
+    if terminal and keys:  # not shown, so that what the command says comes first
         settings = termios.tcgetattr(ours)
         settings[3] &= ~termios.ECHO
         termios.tcsetattr(ours, termios.TCSANOW, settings)
         os.write(ours, keys.encode())
-    return process, {ours: "out"}
+    return process, read
 
 
 def _obey_ctrl_c() -> None:
@@ -208,9 +244,3 @@ def _read(descriptor: int) -> bytes:
         return os.read(descriptor, 1 << 16)
     except OSError:  # the terminal's other side is closed
         return b""
-
-
-def _end(process: subprocess.Popen[bytes], number: int) -> None:
-    """Send a signal to the command and all that it started."""
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, number)
