@@ -13,7 +13,6 @@ exit code 1.
 
 from __future__ import annotations
 
-import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -25,14 +24,12 @@ from traceback import extract_tb
 from typing import Any
 
 import click
-from rich.console import Console
 
 from benchmarks.checks.fuzz_checks import Pictures, RoomChecker, floor, scene_of
 from benchmarks.checks.fuzz_report import FuzzPlan, FuzzReport, FuzzStep, show
 from benchmarks.checks.fuzz_requests import Request, Room, draw_request
-from benchmarks.checks.scene_jobs import choose_scenes, run_scene_jobs
-from benchmarks.cli.progress import bar
-from er_gym.rollout.worker_pool import LostJob
+from benchmarks.checks.scene_jobs import play_options, run_scene_jobs, with_bar
+from benchmarks.terminal import echo
 from er_gym.sim.controller import EmbeddedController
 from er_gym.sim.engine import Engine
 from er_gym.sim.errors import CLIENT_ERRORS
@@ -179,55 +176,39 @@ def _player(plan: FuzzPlan) -> Callable[[int], FuzzReport]:
 
 def fuzz(plan: FuzzPlan, workers: int) -> Iterator[FuzzReport]:
     """The report of every run, as it ends, from ``workers`` processes (1: this process)."""
-    for run, report in run_scene_jobs(partial(_player, plan), range(plan.runs), workers):
-        if isinstance(report, LostJob):
-            died = f"the process died, exit code {report.exitcode}"
-            report = FuzzReport(wrong=[FuzzStep(run, 0, "?", {}, "", [died], 0.0)])
-        yield report
+
+    def lost(run: int, died: str) -> FuzzReport:
+        return FuzzReport(wrong=[FuzzStep(run, 0, "?", {}, "", [died], 0.0)])
+
+    return run_scene_jobs(partial(_player, plan), range(plan.runs), workers, lost)
 
 
 @click.command()
-@click.option("--actions", default=10_000, show_default=True, type=click.IntRange(1))
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
-@click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
-@click.option("--scenes", default="all", show_default=True, help="all, how many, or names.")
+@play_options(actions=10_000)
 @click.option("--run", type=click.IntRange(0), help="Play only this run, and print every step.")
-def main(actions: int, seed: int, workers: int, scenes: str, run: int | None) -> None:
+def main(scenes: list[str], actions: int, seed: int, workers: int, run: int | None) -> None:
     """Play random actions, valid and absurd, and check the invariants."""
-    try:
-        plan = FuzzPlan(seed, actions, tuple(choose_scenes(scenes)))
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
-    console = Console(width=None if sys.stdout.isatty() else 120)
-    total, start = FuzzReport(), time.perf_counter()
+    plan = FuzzPlan(seed, actions, tuple(scenes))
+    total, start, code = FuzzReport(), time.perf_counter(), 0
     if run is not None:
         if run >= plan.runs:
             raise click.UsageError(f"--run must be from 0 to {plan.runs - 1}, not {run}")
         for step in play(plan, run):
             total.count(step)
-            console.print(str(step), markup=False, soft_wrap=True)
-        raise SystemExit(show(total, plan, time.perf_counter() - start, console))
-    code = 0
-    try:
-        _play_all(plan, workers, total)
-    except KeyboardInterrupt:
-        console.print("interrupted; so far:")
-        code = _INTERRUPTED
-    raise SystemExit(show(total, plan, time.perf_counter() - start, console) or code)
+            echo(step)
+    else:
 
-
-def _play_all(plan: FuzzPlan, workers: int, total: FuzzReport) -> None:
-    """Play every run and show a bar; each run is counted when it ends, so Ctrl-C loses only the
-    current ones.
-    """
-    start = time.perf_counter()
-    with bar(Console(stderr=True)) as progress:
-        task = progress.add_task("fuzz", total=plan.runs, status="starting")
-        for report in fuzz(plan, workers):
-            total.add(report)
+        def status() -> str:
             speed = total.total.tries / (time.perf_counter() - start)
-            status = f"{speed:.0f} actions/s, {len(total.wrong)} with problems"
-            progress.update(task, advance=1, status=status)
+            return f"{speed:.0f} actions/s, {len(total.wrong)} with problems"
+
+        try:
+            for report in with_bar("fuzz", plan.runs, fuzz(plan, workers), status):
+                total.add(report)
+        except KeyboardInterrupt:
+            echo("interrupted; so far:")
+            code = _INTERRUPTED
+    raise SystemExit(show(total, plan, time.perf_counter() - start) or code)
 
 
 if __name__ == "__main__":

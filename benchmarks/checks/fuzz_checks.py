@@ -59,7 +59,8 @@ def floor(scene: str, step: float = _FLOOR_STEP) -> tuple[dict[str, float], ...]
 
 
 @lru_cache(maxsize=128)
-def _floor_points(scene: str) -> NDArray[np.float64]:
+def floor_points(scene: str) -> NDArray[np.float64]:
+    """(P, 2) x and z of :func:`floor`, metres."""
     return floor_of(list(floor(scene)))
 
 
@@ -188,7 +189,7 @@ class RoomChecker:
         # A forced teleport may end in a wall.
         forced = name in _TELEPORTS and "forceAction" in request
         if before["agent"]["position"] != after["agent"]["position"] and not forced:
-            yield from stands_on_the_floor(after, _floor_points(scene_of(after)))
+            yield from stands_on_the_floor(after, floor_points(scene_of(after)))
 
     def _kept_metadata_unchanged(self, metadata: dict[str, Any]) -> Iterator[str]:
         """Metadata that a caller has kept do not change later."""

@@ -8,11 +8,9 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
-
 from benchmarks.checks.fuzz_requests import PARAMETERS, Request
+from benchmarks.harness.output import print_table
+from benchmarks.terminal import echo
 from er_gym.sim.scene import SCENE_NAMES
 
 STEPS = 200
@@ -88,6 +86,12 @@ class ActionCounts:
         self.seconds += other.seconds
         self.slowest = max(self.slowest, other.slowest)
 
+    def row(self) -> tuple[object, ...]:
+        """As the table has them."""
+        mean, slowest = self.seconds / max(1, self.tries), self.slowest
+        counts = (self.tries, self.successes, self.tries - self.successes, self.problems)
+        return (*counts, f"{1000 * mean:.2f}", f"{1000 * slowest:.2f}")
+
 
 @dataclass
 class FuzzReport:
@@ -122,25 +126,25 @@ class FuzzReport:
         return total
 
 
-def show(report: FuzzReport, plan: FuzzPlan, seconds: float, console: Console) -> int:
+def show(report: FuzzReport, plan: FuzzPlan, seconds: float) -> int:
     """Print the problems, the table and a line that sums it up; returns the exit code."""
     kinds: Counter[str] = Counter()
     for step in sorted(report.wrong, key=lambda step: (step.run, step.number)):
         kind = _kind(step.problems[0])
         kinds[kind] += 1
         if kinds[kind] <= _SHOWN:
-            console.print(f"{step}\n  again: {again(plan, step.run)}", markup=False, soft_wrap=True)
+            echo(f"{step}\n  again: {again(plan, step.run)}")
     for kind, count in kinds.items():
         if count > _SHOWN:
-            console.print(f"{count - _SHOWN} more where: {kind}", markup=False, soft_wrap=True)
-    console.print(_table(report))
+            echo(f"{count - _SHOWN} more where: {kind}")
+    head = ("action", "tries", "successes", "refusals", "problems", "mean ms", "slowest ms")
+    rows = [*sorted(report.tallies.items()), ("all", report.total)]
+    print_table("Actions played", head, ((name, *counts.row()) for name, counts in rows))
     total, bad = report.total, len(report.wrong)
-    console.print(
+    echo(
         f"{'BROKEN' if bad else 'ok'}: {total.tries} actions in {seconds:.1f} s "
         f"({100 * total.successes / max(1, total.tries):.1f} % succeeded), seed {plan.seed}, "
-        f"fingerprint {report.fingerprint:08x}, problems {bad}",
-        soft_wrap=True,
-        highlight=False,
+        f"fingerprint {report.fingerprint:08x}, problems {bad}"
     )
     return 1 if bad else 0
 
@@ -158,17 +162,3 @@ def again(plan: FuzzPlan, run: int) -> str:
         f"python -m benchmarks.checks.fuzz --actions {plan.actions} --seed {plan.seed}{scenes} "
         f"--run {run}"
     )
-
-
-def _table(report: FuzzReport) -> Table:
-    table = Table(title="Actions played")
-    table.add_column("action")
-    for heading in ("tries", "successes", "refusals", "problems", "mean ms", "slowest ms"):
-        table.add_column(heading, justify="right")
-    rows = [*sorted(report.tallies.items()), ("all", report.total)]
-    for name, tally in rows:
-        counts = (tally.tries, tally.successes, tally.tries - tally.successes, tally.problems)
-        times = (tally.seconds / max(1, tally.tries), tally.slowest)
-        cells = (*map(str, counts), *(f"{1000 * value:.2f}" for value in times))
-        table.add_row(escape(name), *cells, end_section=name == rows[-2][0])
-    return table

@@ -407,12 +407,15 @@ def _next(room: Room) -> Sequence[str]:
     return NAMES
 
 
+def valid_request(room: Room) -> Request:
+    """The next request of a normal program, which asks for no picture."""
+    random = room.random
+    return _sane(room, random.choice(_next(room) if random.random() < _FOLLOW_UP_RATE else NAMES))
+
+
 def draw_request(room: Room) -> Request:
     """The next request; it shares nothing with the metadata or with another request."""
-    random = room.random
-    request = _sane(
-        room, random.choice(_next(room) if random.random() < _FOLLOW_UP_RATE else NAMES)
-    )
+    random, request = room.random, valid_request(room)
     if random.random() < _PICTURE_RATE:
         request["renderImage"] = True
         for flag in ("renderInstanceSegmentation", "renderSemanticSegmentation"):

@@ -1,12 +1,15 @@
-"""Options of the fuzz and the soak: which scenes, and how many processes."""
+"""What the fuzz and the soak share: which scenes, how many processes, and a bar."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, TypeVar
 
+import click
 import numpy as np
+from rich.console import Console
 
+from benchmarks.cli.progress import bar
 from er_gym.rollout.worker_pool import LostJob, run_jobs
 from er_gym.thor import SCENE_NAMES
 
@@ -34,11 +37,59 @@ def choose_scenes(asked: str) -> list[str]:
     return names
 
 
+def _chosen(context: click.Context, parameter: click.Parameter, asked: str) -> list[str]:
+    try:
+        return choose_scenes(asked)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+
+
+def play_options(actions: int) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """The options ``--scenes``, ``--actions`` with this default, ``--seed`` and ``--workers``."""
+    options = (
+        click.option(
+            "--scenes", default="all", callback=_chosen, help="all, how many, or names.",
+            show_default=True,
+        ),
+        click.option("--actions", default=actions, show_default=True, type=click.IntRange(1)),
+        click.option("--seed", default=0, show_default=True, type=click.IntRange(0)),
+        click.option("--workers", default=2, show_default=True, type=click.IntRange(1)),
+    )  # fmt: skip
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
+
+
 def run_scene_jobs(
-    make: Callable[[], Callable[[Job], Result]], jobs: Sequence[Job], workers: int
-) -> Iterator[tuple[Job, Result | LostJob]]:
-    """Do every job once in ``workers`` processes (1: in this process)."""
+    make: Callable[[], Callable[[Job], Result]],
+    jobs: Sequence[Job],
+    workers: int,
+    lost: Callable[[Job, str], Result],
+) -> Iterator[Result]:
+    """Do every job once in ``workers`` processes (1: in this process).
+
+    ``lost`` says what becomes of a job whose process died, and in which words.
+    """
     if workers == 1:
-        do = make()
-        return ((job, do(job)) for job in jobs)
-    return run_jobs(make, jobs, workers=workers, tries=1)
+        yield from map(make(), jobs)
+        return
+    for job, result in run_jobs(make, jobs, workers=workers, tries=1):
+        if isinstance(result, LostJob):
+            yield lost(job, f"the process died, exit code {result.exitcode}")
+        else:
+            yield result
+
+
+def with_bar(
+    what: str, total: int, reports: Iterable[Result], status: Callable[[], str]
+) -> Iterator[Result]:
+    """The reports, with a bar that says the status after each has been taken."""
+    with bar(Console(stderr=True)) as shown:
+        task = shown.add_task(what, total=total, status="starting")
+        for report in reports:
+            yield report
+            shown.update(task, advance=1, status=status())

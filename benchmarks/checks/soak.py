@@ -2,44 +2,34 @@
 
     python -m benchmarks.checks.soak [--scenes all|N] [--actions 2000] [--level env|engine]
 
-``env`` plays random legal actions through the environment; ``engine`` sends random AI2-THOR
-actions, legal or not, to the controller. After each step the invariants of
-:mod:`benchmarks.checks.invariants` are checked. It ends with one line. If an invariant is broken,
-the exit code is 1 and the output has the command that repeats it.
+``env`` plays random legal actions through the environment, and checks the invariants of
+:mod:`benchmarks.checks.invariants` after each. ``engine`` sends random AI2-THOR actions, legal or
+not, through the official client's interface, those of a normal program in
+:mod:`benchmarks.checks.fuzz_requests`, and checks all that the fuzz checks. It ends with one line.
+If something is broken, the exit code is 1 and the output has the command that repeats it.
 """
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from random import Random
 
 import click
 import numpy as np
-from rich.console import Console
 
-from benchmarks.checks.invariants import (
-    Metadata,
-    a_refusal_changed_nothing,
-    broken,
-    stands_on_the_floor,
-)
-from benchmarks.checks.scene_jobs import choose_scenes, run_scene_jobs
-from benchmarks.cli.progress import bar
+from benchmarks.checks.fuzz import ClientDriver, FuzzRun
+from benchmarks.checks.fuzz_checks import floor_points
+from benchmarks.checks.fuzz_requests import valid_request
+from benchmarks.checks.invariants import Metadata, broken, stands_on_the_floor
+from benchmarks.checks.scene_jobs import play_options, run_scene_jobs, with_bar
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.rollout.worker_pool import LostJob
-from er_gym.sim.space.walkable_floor import standing_places
 from er_gym.tasks import verbs
 from er_gym.tasks.task import KeyAction, Task
 from er_gym.tasks.types import TASK_TYPES
-from er_gym.thor import SCENE_NAMES, make_controller
-
-_FLOOR_STEP = 0.05
-_ANY_OBJECT = 0.2
-"""The probability that an object is drawn from all, not only from those that suit the action."""
+from er_gym.thor import SCENE_NAMES
 
 
 @dataclass(frozen=True)
@@ -62,20 +52,7 @@ class SoakReport:
 
 
 Step = tuple[str, Metadata, list[str]]
-"""An action, the metadata after it, and problems besides the invariants."""
-
-
-def _random(scene: str, seed: int) -> np.random.Generator:
-    return np.random.default_rng([seed, SCENE_NAMES.index(scene)])
-
-
-def _floor(controller: Any) -> np.ndarray:
-    """(P, 2) x and z where the agent can stand, metres."""
-    scene = controller.last_event.metadata["sceneName"].removesuffix("_physics")
-    return standing_places(scene, _FLOOR_STEP)
-
-
-# -- through the environment -----------------------------------------------------------------------
+"""An action, the metadata after it, and the problems."""
 
 
 def free_play(scene: str) -> Task:
@@ -91,12 +68,12 @@ def free_play(scene: str) -> Task:
 
 def play_env(scene: str, seed: int) -> Iterator[Step]:
     """Random legal actions; a new episode whenever one is over."""
-    random = _random(scene, seed)
+    random = np.random.default_rng([seed, SCENE_NAMES.index(scene)])
     env = EmbodiedEnv([free_play(scene)], obs_mode="state", instances="explore")
     try:
         _, info = env.reset(seed=seed)
         controller = env._controller  # the soak reads the environment's internals
-        floor, over = _floor(controller), False
+        floor, over = floor_points(scene), False
         while True:
             if over:
                 _, info = env.reset()
@@ -107,124 +84,20 @@ def play_env(scene: str, seed: int) -> Iterator[Step]:
             if not np.isfinite(reward):
                 problems.append(f"the reward is {reward}")
             metadata = controller.last_event.metadata
-            problems.extend(stands_on_the_floor(metadata, floor))
+            problems += [*broken(metadata), *stands_on_the_floor(metadata, floor)]
             yield info["action"], metadata, problems
     finally:
         env.close()
 
 
-# -- through the controller ------------------------------------------------------------------------
-
-Parameters = Callable[[np.random.Generator, Metadata, Sequence[dict[str, float]]], dict[str, Any]]
-
-
-def _nothing(random: np.random.Generator, metadata: Metadata, positions: Any) -> dict[str, Any]:
-    return {}
-
-
-def _one_of(name: str, values: Sequence[float | None]) -> Parameters:
-    def draw(random: np.random.Generator, metadata: Metadata, positions: Any) -> dict[str, Any]:
-        value = values[int(random.integers(len(values)))]
-        return {} if value is None else {name: value}
-
-    return draw
-
-
-def _object(prop: str, **more: Sequence[Any]) -> Parameters:
-    """An object, usually one with a property; sometimes with force."""
-
-    def draw(random: np.random.Generator, metadata: Metadata, positions: Any) -> dict[str, Any]:
-        objects = metadata["objects"]
-        suited = [entry for entry in objects if prop == "" or entry[prop]] or objects
-        seen = [entry for entry in suited if entry["visible"]]
-        pool = objects if random.random() < _ANY_OBJECT else (seen or suited)
-        chosen = {"objectId": pool[int(random.integers(len(pool)))]["objectId"]}
-        extra = {name: values[int(random.integers(len(values)))] for name, values in more.items()}
-        return {**chosen, **extra}
-
-    return draw
-
-
-def _anywhere(
-    random: np.random.Generator, metadata: Metadata, positions: Sequence[dict[str, float]]
-) -> dict[str, Any]:
-    """A pose on the floor or near it."""
-    position = dict(positions[int(random.integers(len(positions)))])
-    if random.random() < _ANY_OBJECT:
-        position["x"] += float(random.normal())
-    return {
-        "position": position,
-        "rotation": float(random.integers(24)) * 15.0,
-        "horizon": float(random.choice([-30, 0, 30, 60])),
-        "standing": bool(random.random() < 0.8),
-    }
-
-
-_FORCE = {"forceAction": (False, True)}
-_STEPS = _one_of("moveMagnitude", (None, 0.0, 0.1, 0.25, 0.5, 1.0, 5.0))
-_TURNS = _one_of("degrees", (None, 0.0, 30.0, 45.0, 90.0, -90.0, 360.0))
-_TILTS = _one_of("degrees", (None, 1.0, 15.0, 30.0, 88.0))
-
-REPERTOIRE: dict[str, Parameters] = {
-    "Pass": _nothing,
-    "Done": _nothing,
-    "Stand": _nothing,
-    "Crouch": _nothing,
-    "MoveAhead": _STEPS,
-    "MoveBack": _STEPS,
-    "MoveLeft": _STEPS,
-    "MoveRight": _STEPS,
-    "RotateLeft": _TURNS,
-    "RotateRight": _TURNS,
-    "LookUp": _TILTS,
-    "LookDown": _TILTS,
-    "Teleport": _anywhere,
-    "TeleportFull": _anywhere,
-    "GetReachablePositions": _one_of("gridSize", (None, 0.25, 0.5)),
-    "GetInteractablePoses": _object("", maxPoses=(1, 10)),
-    "PickupObject": _object("pickupable", **_FORCE),
-    "PutObject": _object("receptacle", **_FORCE),
-    "DropHandObject": _nothing,
-    "OpenObject": _object("openable", openness=(0.2, 1.0), **_FORCE),
-    "CloseObject": _object("openable", **_FORCE),
-    "ToggleObjectOn": _object("toggleable", **_FORCE),
-    "ToggleObjectOff": _object("toggleable", **_FORCE),
-    "SliceObject": _object("sliceable", **_FORCE),
-    "CookObject": _object("cookable", **_FORCE),
-    "DirtyObject": _object("dirtyable", **_FORCE),
-    "CleanObject": _object("dirtyable", **_FORCE),
-    "FillObjectWithLiquid": _object(
-        "canFillWithLiquid", fillLiquid=("water", "coffee", "wine"), **_FORCE
-    ),
-    "EmptyLiquidFromObject": _object("canFillWithLiquid", **_FORCE),
-    "BreakObject": _object("breakable", **_FORCE),
-    "UseUpObject": _object("pickupable", **_FORCE),
-}
-"""How each action's parameters are drawn."""
-
-_OFTEN = ("PickupObject", "PutObject", "OpenObject", "TeleportFull")
-"""Without these actions most of the others would be refused."""
-
-
 def play_engine(scene: str, seed: int) -> Iterator[Step]:
     """Random AI2-THOR actions with valid parameters; the actions need not be legal."""
-    random = _random(scene, seed)
-    names = [*REPERTOIRE, *3 * _OFTEN]
-    controller = make_controller(scene=scene, headless=True, snapToGrid=False, gridSize=0.25)
-    try:
-        floor = _floor(controller)
-        positions = controller.step(action="GetReachablePositions").metadata["actionReturn"]
-        before = controller.last_event.metadata
-        while True:
-            name = names[int(random.integers(len(names)))]
-            arguments = REPERTOIRE[name](random, before, positions)
-            after = controller.step(action=name, **arguments).metadata
-            problems = list(stands_on_the_floor(after, floor))
-            problems.extend(a_refusal_changed_nothing(before, after))
-            yield f"{name} {arguments}", after, problems
-            before = after
-    finally:
-        controller.stop()
+    random, game = Random(f"{seed} {scene}"), FuzzRun(ClientDriver)
+    game.do({"action": "Reset", "sceneName": scene, "renderImage": False})
+    while True:
+        request = valid_request(game.room(random, [scene]))
+        problems = game.do(request)
+        yield str(request), game.metadata, problems
 
 
 LEVELS: dict[str, Callable[[str, int], Iterator[Step]]] = {
@@ -244,7 +117,6 @@ def soak_scene(scene: str, *, level: str, actions: int, seed: int) -> SoakReport
             what, metadata, problems = next(player)
             done += 1
             succeeded += metadata["lastActionSuccess"]
-            problems = [*broken(metadata), *problems]
             if problems:
                 problem = f"after action {done}, {what}: {'; '.join(problems)}"
     except Exception as error:  # no exception may be raised
@@ -262,36 +134,29 @@ def soak(
     scenes: Sequence[str], *, level: str, actions: int, seed: int, workers: int
 ) -> Iterator[SoakReport]:
     """Play in all scenes in ``workers`` processes (1: in this process)."""
-    for scene, report in run_scene_jobs(partial(_player, level, actions, seed), scenes, workers):
-        if isinstance(report, LostJob):
-            report = SoakReport(scene, 0, 0, 0.0, f"the process died, exit code {report.exitcode}")
-        yield report
+
+    def lost(scene: str, died: str) -> SoakReport:
+        return SoakReport(scene, 0, 0, 0.0, died)
+
+    return run_scene_jobs(partial(_player, level, actions, seed), scenes, workers, lost)
 
 
 @click.command()
-@click.option("--scenes", default="all", show_default=True, help="all, how many, or names.")
-@click.option("--actions", default=2000, show_default=True, type=click.IntRange(1))
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
-@click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
+@play_options(actions=2000)
 @click.option("--level", default="env", show_default=True, type=click.Choice(list(LEVELS)))
-def main(scenes: str, actions: int, seed: int, workers: int, level: str) -> None:
+def main(scenes: list[str], actions: int, seed: int, workers: int, level: str) -> None:
     """Play random actions in the scenes and check the invariants."""
-    try:
-        chosen = choose_scenes(scenes)
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
-    console = Console(stderr=True)
     reports: list[SoakReport] = []
     start = time.perf_counter()
-    with bar(console) as progress:
-        task = progress.add_task(f"soak, {level}", total=len(chosen), status="starting")
-        for report in soak(chosen, level=level, actions=actions, seed=seed, workers=workers):
-            reports.append(report)
-            speed = sum(r.actions for r in reports) / (time.perf_counter() - start)
-            bad = sum(bool(r.problem) for r in reports)
-            progress.update(
-                task, advance=1, status=f"{speed:.0f} actions/s, {bad} scenes with problems"
-            )
+
+    def status() -> str:
+        speed = sum(r.actions for r in reports) / (time.perf_counter() - start)
+        bad = sum(bool(r.problem) for r in reports)
+        return f"{speed:.0f} actions/s, {bad} scenes with problems"
+
+    played = soak(scenes, level=level, actions=actions, seed=seed, workers=workers)
+    for report in with_bar(f"soak, {level}", len(scenes), played, status):
+        reports.append(report)
     raise SystemExit(verdict(reports, level=level, actions=actions, seed=seed))
 
 
@@ -314,4 +179,4 @@ def verdict(reports: Sequence[SoakReport], *, level: str, actions: int, seed: in
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

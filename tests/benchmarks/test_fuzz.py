@@ -10,7 +10,6 @@ from random import Random
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from rich.console import Console
 
 from benchmarks.checks import fuzz as fuzz_script
 from benchmarks.checks.fuzz import fuzz, main, play, play_run
@@ -259,13 +258,12 @@ def test_questions_are_actions():
 # -- the command -----------------------------------------------------------------------------------
 
 
-def test_problems_are_shown_with_the_way_to_see_them_again(monkeypatch):
+def test_problems_are_shown_with_the_way_to_see_them_again(monkeypatch, capsys):
     run_instead(monkeypatch, "Pass", raises)
     monkeypatch.setattr("benchmarks.checks.fuzz_requests.NAMES", ["Pass"])
     plan = FuzzPlan(seed=5, actions=8, scenes=("FloorPlan402",))
-    console = Console(record=True, width=120)
-    assert show(played(plan), plan, 1.0, console) == 1
-    shown = console.export_text()
+    assert show(played(plan), plan, 1.0) == 1
+    shown = capsys.readouterr().out
     assert "in FloorPlan402: {'action': 'Pass'" in shown
     assert "--actions 8 --seed 5 --scenes FloorPlan402 --run 0" in shown
     assert "more where: raised at registry.py:" in shown
