@@ -105,7 +105,6 @@ def run(
     until: str = "",
     keys: str = "",
     seconds: float = 300.0,
-    handles: Sequence[int] = (),
 ) -> TerminalRun:
     """Run a command to its end, and end what it started and left behind.
 
@@ -118,11 +117,10 @@ def run(
         until: a regular expression; once the output has it, Ctrl-C is sent. For servers.
         keys: what is typed at once.
         seconds: after these it is killed.
-        handles: file descriptors that stay open in it.
     """
     variables = plain_environment() if environment is None else environment
     start = time.monotonic()
-    process, streams = _start(argv, cwd, variables, keys, terminal, handles)
+    process, streams = _start(argv, cwd, variables, keys, terminal)
     done = TerminalRun()
     wanted = re.compile(until) if until else None
     try:
@@ -191,12 +189,7 @@ def members(session: int) -> Iterator[tuple[int, str]]:
 
 
 def _start(
-    argv: Sequence[str],
-    cwd: Path,
-    variables: Mapping[str, str],
-    keys: str,
-    terminal: bool,
-    handles: Sequence[int],
+    argv: Sequence[str], cwd: Path, variables: Mapping[str, str], keys: str, terminal: bool
 ) -> tuple[subprocess.Popen[bytes], dict[int, str]]:
     """The process, and what to read its outputs from."""
     if terminal:
@@ -215,7 +208,6 @@ def _start(
         stdin=ends[0],
         stdout=ends[1],
         stderr=ends[2],
-        pass_fds=handles,
         start_new_session=True,
         preexec_fn=_take_terminal if terminal else _obey_ctrl_c,
     )

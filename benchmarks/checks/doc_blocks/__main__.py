@@ -21,7 +21,7 @@ import click
 from benchmarks.checks.doc_blocks.blocks import Block, Part, blocks
 from benchmarks.checks.doc_blocks.run import Ended, environment, run
 from benchmarks.checks.doc_blocks.table import NEVER, SLOW, reason, stale
-from benchmarks.checks.doc_blocks.warm import Warm, warm
+from benchmarks.checks.doc_blocks.warm import warm
 from benchmarks.harness.output import ROOT
 from benchmarks.harness.tally import Tally, Try, end, end_on_sigterm, tally
 
@@ -82,7 +82,7 @@ def run_pages(folder: Path, names: Sequence[str] = (), *, light: bool = False) -
             shutil.rmtree(place, ignore_errors=True)
 
 
-def _prepared(page: str, place: Path, started: Warm) -> Iterator[Ended]:
+def _prepared(page: str, place: Path, started: Mapping[str, str]) -> Iterator[Ended]:
     """Make what the reader of a page has already; yields what fails."""
     text = "\n".join(GIVEN.get(page, ()))
     if text:

@@ -10,13 +10,12 @@ import os
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.checks.doc_blocks.blocks import PYTHON, SHELL, Block, Part
 from benchmarks.checks.doc_blocks.readers import reader
-from benchmarks.checks.doc_blocks.warm import Warm
 from benchmarks.harness import processes
 from benchmarks.harness.output import ROOT
 
@@ -57,7 +56,7 @@ def environment(folder: Path) -> dict[str, str]:
 def run(
     blocks: Sequence[Block],
     folder: Path,
-    started: Warm,
+    started: Mapping[str, str],
     left_out: Callable[[Part], bool],
     seconds: float,
 ) -> Iterator[Ended]:
@@ -66,7 +65,7 @@ def run(
     Args:
         blocks: of one page, in order.
         folder: where; it exists.
-        started: of :func:`~benchmarks.checks.doc_blocks.warm.warm`.
+        started: the environment of :func:`~benchmarks.checks.doc_blocks.warm.warm`.
         left_out: whether a part is not to be run.
         seconds: after which a block is killed.
     """
@@ -99,16 +98,11 @@ def _script(parts: Sequence[Part]) -> str:
     return "\n".join(lines)
 
 
-def _ran(command: Sequence[str], folder: Path, started: Warm, seconds: float) -> tuple[str, str]:
+def _ran(
+    command: Sequence[str], folder: Path, started: Mapping[str, str], seconds: float
+) -> tuple[str, str]:
     """Where a command failed, if it says so, and what it then said."""
-    done = processes.run(
-        command,
-        cwd=folder,
-        terminal=False,
-        environment=started.environment,
-        seconds=seconds,
-        handles=[started.handle],
-    )
+    done = processes.run(command, cwd=folder, terminal=False, environment=started, seconds=seconds)
     if done.late:
         return "", f"did not end in {seconds:.0f} s"
     if done.code == 0:

@@ -1,7 +1,7 @@
 """A process that has imported er-gym, and forks for each ``er-gym`` that a shell starts.
 
 A fresh process spends more time on imports than most commands of the documentation take. A shell
-that is given :attr:`Warm.environment` finds this module's ``er-gym`` first. It hands its words,
+with the environment of :func:`warm` finds this module's ``er-gym`` first. It hands its words,
 folder, environment and streams to the process, and ends as the fork does. A fork is as good as a
 fresh process as long as nothing was done in the parent but importing. So where a variable says
 which parts of other packages are imported with er-gym, ``er-gym`` is a fresh process.
@@ -9,22 +9,23 @@ which parts of other packages are imported with er-gym, ``er-gym`` is a fresh pr
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import fcntl
 import importlib
 import json
 import os
-import selectors
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from socketserver import BaseRequestHandler, ForkingMixIn, UnixStreamServer
+from uuid import uuid4
 
 from benchmarks.harness.processes import end_group
 
-_SOCKET = "DOC_BLOCKS_SOCKET"
 _LONGEST = 1 << 17
 _IMPORTED = (
     "benchmarks.cli.main",
@@ -39,137 +40,90 @@ _CLIENT = """#!{python} -IS
 import json, os, socket, sys
 if any(name.startswith("ER_GYM_") for name in os.environ):
     os.execv({python!r}, [{python!r}, "-m", "benchmarks.cli", *sys.argv[1:]])
-asked, answer = socket.socketpair()
-said = json.dumps([sys.argv[1:], os.getcwd(), dict(os.environ)]).encode()
-with socket.socket(fileno=int(os.environ[{socket!r}])) as server:
-    socket.send_fds(server, [said], [0, 1, 2, answer.fileno()])
-answer.close()
-code = int(asked.recv(16) or 70)
-sys.exit(code if code >= 0 else 128 - code)
+with socket.socket(socket.AF_UNIX) as server:
+    server.connect({server!r})
+    said = json.dumps([sys.argv[1:], os.getcwd(), dict(os.environ)]).encode()
+    socket.send_fds(server, [said], [0, 1, 2])
+    code = int(server.recv(16) or 70)
+sys.exit(code)
 """
 
 
-@dataclass(frozen=True)
-class Warm:
-    """A running process. ``environment`` is for shells; ``handle`` must stay open in them."""
-
-    environment: Mapping[str, str]
-    handle: int
-
-
 @contextlib.contextmanager
-def warm(folder: Path, environment: Mapping[str, str]) -> Iterator[Warm]:
+def warm(folder: Path, environment: Mapping[str, str]) -> Iterator[dict[str, str]]:
     """Start the process, and end it with all that it started.
 
     Args:
         folder: where the program ``er-gym`` is put; it is made.
-        environment: of the shells.
+        environment: of the shells; yields what they are to be given in its place.
     """
     folder.mkdir()
-    client = folder / "er-gym"
-    client.write_text(_CLIENT.format(python=sys.executable, socket=_SOCKET))
+    client, name = folder / "er-gym", f"er-gym-{uuid4()}"
+    client.write_text(_CLIENT.format(python=sys.executable, server=f"\0{name}"))
     client.chmod(0o755)
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
-    with ours, theirs:
-        process = subprocess.Popen(
-            [sys.executable, "-m", __spec__.name, str(theirs.fileno())],
-            pass_fds=[theirs.fileno()],
-            env=dict(environment),
-            stdin=subprocess.PIPE,  # its end ends the process
-        )
-        path = os.pathsep.join((str(folder), str(Path(sys.executable).parent), environment["PATH"]))
-        given = {**environment, "PATH": path, _SOCKET: str(ours.fileno())}
+    command = [sys.executable, "-m", __spec__.name, name]
+    path = os.pathsep.join((str(folder), str(Path(sys.executable).parent), environment["PATH"]))
+    with subprocess.Popen(
+        command, env=dict(environment), stdout=subprocess.PIPE, start_new_session=True
+    ) as process:
         try:
-            yield Warm(given, ours.fileno())
+            assert process.stdout is not None
+            process.stdout.readline()  # it is ready
+            yield {**environment, "PATH": path}
         finally:
-            assert process.stdin is not None
-            process.stdin.close()
-            process.wait()
+            end_group(process.pid)
 
 
-def main(handle: int) -> None:
-    """Fork for each request. A fork goes on from here as its command would, and ends like it."""
-    for name in _IMPORTED:
-        importlib.import_module(name)
-    request = _serve(socket.socket(fileno=handle))
-    if request is not None:
-        _become(*request)
+class _Server(ForkingMixIn, UnixStreamServer):
+    parent = os.getppid()
+
+    def service_actions(self) -> None:
+        super().service_actions()
+        if os.getppid() != self.parent:  # whoever started it has gone
+            sys.exit()
 
 
-def _become(words: list[str], folder: str, environment: Mapping[str, str]) -> None:
-    """Do in this process, whose streams are in place, what ``er-gym`` does in a fresh one."""
-    # Those of the parent remember what its streams were, such as whether they can be wound back.
-    sys.stdin, sys.stdout, sys.stderr = map(os.fdopen, range(3), "rww")
-    os.chdir(folder)
-    os.environ.clear()
-    os.environ.update(environment)
-    sys.path[0] = os.path.dirname(environment["PATH"].partition(os.pathsep)[0])
-    sys.argv = [str(Path(sys.executable).with_name("er-gym")), *words]
-    from benchmarks.cli.main import main as er_gym
+class _Fork(BaseRequestHandler):
+    """Does in a fork what ``er-gym`` does in a fresh process."""
 
-    er_gym(words)  # ends this process
+    request: socket.socket
 
-
-def _serve(server: socket.socket) -> tuple[list[str], str, dict[str, str]] | None:
-    """The request of a fork, in the fork; None in the parent, once nobody needs it any more."""
-    running: dict[int, tuple[int, socket.socket]] = {}
-    with selectors.DefaultSelector() as waiting:
-        waiting.register(0, selectors.EVENT_READ, None)
-        waiting.register(server, selectors.EVENT_READ, server)
-        while True:
-            for key, _ in waiting.select():
-                if key.data is None:
-                    for pid, _ in running.values():
-                        end_group(pid)
-                    return None
-                if key.data is server:
-                    request = _accepted(server, waiting, running)
-                    if request is not None:
-                        return request
-                elif key.fd in running:
-                    _ended(key.fd, waiting, running)
-                elif key.fileobj.recv(1) == b"":  # type: ignore[union-attr]
-                    end_group(key.data)  # the shell's er-gym was killed
-                    waiting.unregister(key.fileobj)
-
-
-def _accepted(
-    server: socket.socket,
-    waiting: selectors.BaseSelector,
-    running: dict[int, tuple[int, socket.socket]],
-) -> Any:
-    said, streams, _, _ = socket.recv_fds(server, _LONGEST, 4)
-    pid = os.fork()
-    if pid == 0:
-        os.setsid()
-        for number, stream in enumerate(streams[:3]):
+    def handle(self) -> None:
+        said, streams, _, _ = socket.recv_fds(self.request, _LONGEST, 3)
+        words, folder, environment = json.loads(said)
+        os.setpgid(0, 0)
+        # The end of the client, or of its shell, ends the fork and what it has started.
+        fcntl.fcntl(self.request, fcntl.F_SETOWN, -os.getpid())
+        fcntl.fcntl(self.request, fcntl.F_SETFL, os.O_ASYNC)
+        for number, stream in enumerate(streams):
             os.dup2(stream, number)
-        for stream in streams:
             os.close(stream)
-        return json.loads(said)
-    for stream in streams[:3]:
-        os.close(stream)
-    answer = socket.socket(fileno=streams[3])
-    watch = os.pidfd_open(pid)
-    running[watch] = pid, answer
-    waiting.register(watch, selectors.EVENT_READ, watch)
-    waiting.register(answer, selectors.EVENT_READ, pid)
-    return None
+        # Those of the parent remember its streams, such as whether they can be wound back.
+        sys.stdin, sys.stdout, sys.stderr = map(os.fdopen, range(3), "rww")
+        os.chdir(folder)
+        os.environ.clear()
+        os.environ.update(environment)
+        sys.path[0] = os.path.dirname(environment["PATH"].partition(os.pathsep)[0])
+        sys.argv = [str(Path(sys.executable).with_name("er-gym")), *words]
+        from benchmarks.cli.main import main as er_gym
 
-
-def _ended(
-    watch: int, waiting: selectors.BaseSelector, running: dict[int, tuple[int, socket.socket]]
-) -> None:
-    pid, answer = running.pop(watch)
-    _, status = os.waitpid(pid, 0)
-    waiting.unregister(watch)
-    os.close(watch)
-    with contextlib.suppress(KeyError):
-        waiting.unregister(answer)
-    with contextlib.suppress(OSError):
-        answer.send(str(os.waitstatus_to_exitcode(status)).encode())
-    answer.close()
+        code = 1
+        try:
+            er_gym(words)
+        except SystemExit as ended:
+            code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+        finally:
+            # The server ends the fork without the rest of what Python does at its end.
+            threading._shutdown()
+            atexit._run_exitfuncs()
+            sys.stdout.flush()
+            sys.stderr.flush()
+            self.request.sendall(str(code).encode())
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    for module in _IMPORTED:
+        importlib.import_module(module)
+    with _Server(f"\0{sys.argv[1]}", _Fork) as serving:
+        print("ready", flush=True)
+        serving.serve_forever(0.2)
