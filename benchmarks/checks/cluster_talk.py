@@ -22,10 +22,10 @@ import click
 from benchmarks.checks.cluster_kills import episodes_of
 from benchmarks.checks.ray_nodes import RayNodes, ray_nodes
 from benchmarks.harness.chat_server import (
-    TOKENS,
     ChatServer,
     Exchange,
     Messages,
+    counts,
     drawn,
     error,
     key_actions,
@@ -36,16 +36,19 @@ from er_gym.rollout.run_directory import SPENDING
 from er_gym.tasks import load_suite
 
 _CONCURRENCY = 16
+_TOKENS = 420
+"""What the server says that each reply takes."""
 
 
 def troubled(say: Callable[[Messages], str], seed: int) -> ChatServer:
     """Replies with these words, and misbehaves on a fifth of the requests."""
+    tokens = counts(_TOKENS - 20, 20)
     faults = {
-        "none": (80, replies(say, latency=0.05, keep=True)),
+        "none": (80, replies(say, latency=0.05, keep=True, tokens=tokens)),
         "error": (5, error(500, Retry_After="0.2")),
         "hang-up": (5, Exchange.raw),
         "wait": (5, error(429, Retry_After="0.2")),
-        "late": (5, replies(say, latency=1.05, keep=True)),
+        "late": (5, replies(say, latency=1.05, keep=True, tokens=tokens)),
     }
     return ChatServer(drawn(faults, seed))
 
@@ -60,7 +63,7 @@ def main(episodes: int, seed: int) -> None:
     server = troubled(key_actions(tasks), seed)
     with tempfile.TemporaryDirectory() as scratch, ray_nodes(2) as nodes, server:
         out = Path(scratch) / "run"
-        budget = 2 * TOKENS * episodes
+        budget = 2 * _TOKENS * episodes
         ids = ",".join(task.id for task in tasks)
         play = ["bench", "--suite", "er-1k", "--task-ids", ids, "--agent", "openai:troubled"]
         play += ["--base-url", server.url, "--out", str(out), "--concurrency", str(_CONCURRENCY)]
@@ -77,9 +80,9 @@ def main(episodes: int, seed: int) -> None:
             f"{server.answered.total()} replies, {twice} requests answered twice, "
             f"{_tokens(out):,} tokens in the ledger; {dict(server.drawn)}"
         )
-        most = budget + _CONCURRENCY * TOKENS
+        most = budget + _CONCURRENCY * _TOKENS
         good = len(found) == episodes and not crashed and not twice and spent <= most
-        good &= (first, second) == (3, 0) and _tokens(out) == TOKENS * server.answered.total()
+        good &= (first, second) == (3, 0) and _tokens(out) == _TOKENS * server.answered.total()
     raise SystemExit(0 if good else 1)
 
 

@@ -22,7 +22,7 @@ from pathlib import Path
 import click
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
+from PIL import Image
 
 from benchmarks.harness.output import (
     Output,
@@ -31,6 +31,7 @@ from benchmarks.harness.output import (
     progress,
     write_figures,
 )
+from benchmarks.pages.gallery import sheet
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.scene_graph import scene_graph_of
 from er_gym.sim.scene import SCENE_NAMES, load_scene
@@ -298,22 +299,16 @@ def _show(result: Classification, figures: dict[str, float]) -> None:
 
 
 def draw_sheet(result: Classification, images: NDArray[np.uint8], file: Path) -> None:
-    """A contact sheet: a row of wrong crops for a type, worst first; truth above, said below."""
-    columns, tile, line = 12, 120, 14
-    rows = []
+    """A contact sheet of wrong crops, worst types first: under each its type, and the type said."""
+    columns, tile = 12, 120
+    pictures = []
     for kind in result.worst_first():
         wrong = np.flatnonzero((result.truth == kind) & (result.said != kind))
-        chosen = wrong[:: max(1, -(-len(wrong) // columns))].tolist()
-        row = Image.new("RGB", (columns * tile, tile + 2 * line), "white")
-        words = ImageDraw.Draw(row)
-        for column, j in enumerate(chosen):
-            x = column * tile
-            small = Image.fromarray(images[j])
-            row.paste(small.resize((tile - 4, tile - 4), Image.Resampling.NEAREST), (x, line))
-            for name, y in ((kind, 1), (result.said[j], tile + line - 3)):
-                words.text((x, y), result.types[name], "black")
-        rows.extend([np.asarray(row)] if chosen else [])
-    write_picture(file, Image.fromarray(np.concatenate(rows)))
+        for j in wrong[:: max(1, -(-len(wrong) // columns))].tolist():
+            large = Image.fromarray(images[j]).resize((tile, tile), Image.Resampling.NEAREST)
+            name = f"{result.types[kind]}: {result.types[result.said[j]]}"
+            pictures.append((name, np.asarray(large)))
+    write_picture(file, sheet(pictures, columns))
 
 
 @click.command()
@@ -324,8 +319,8 @@ def draw_sheet(result: Classification, images: NDArray[np.uint8], file: Path) ->
     help="At most so many of a type.",
 )  # fmt: skip
 @json_option
-@click.option("--sheet", type=Output(), help="Wrong crops.")
-def main(seed: int, epochs: int, most: int, file: Path | None, sheet: Path | None) -> None:
+@click.option("--sheet", "sheet_file", type=Output(), help="Wrong crops.")
+def main(seed: int, epochs: int, most: int, file: Path | None, sheet_file: Path | None) -> None:
     """Draw crops, train the network, and print the types that it confuses."""
     if importlib.util.find_spec("torch") is None:
         raise click.ClickException("this needs torch: pip install -e '.[rl]'")
@@ -347,8 +342,8 @@ def main(seed: int, epochs: int, most: int, file: Path | None, sheet: Path | Non
         "seconds to train": time.perf_counter() - drawn,
     }
     _show(result, figures)
-    if sheet is not None:
-        draw_sheet(result, asked.images, sheet)
+    if sheet_file is not None:
+        draw_sheet(result, asked.images, sheet_file)
     told = {
         types[kind]: {
             "crops": int((result.truth == kind).sum()),

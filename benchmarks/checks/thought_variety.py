@@ -10,33 +10,17 @@ the milliseconds a thought::
 from __future__ import annotations
 
 import statistics
-import time
 from collections import Counter
 
 import click
 
-from agents.expert.writers.base import ThoughtRequest, ThoughtWriter, WrittenThoughts
+from agents.expert.writers.base import ThoughtRequest
 from agents.expert.writers.grounded import sentences, words
 from agents.expert.writers.registry import WRITERS
 from benchmarks.checks.thought_episodes import played, written
+from benchmarks.harness.measuring import timed
 from er_gym.data.critic import Refusal, check
 from er_gym.data.trajectory import Language
-
-
-class _Timed:
-    """A writer that adds up the time of another."""
-
-    def __init__(self, writer: ThoughtWriter) -> None:
-        self.name = writer.name
-        self._writer = writer
-        self.seconds = 0.0
-
-    def write(self, request: ThoughtRequest) -> WrittenThoughts:
-        """See :class:`~agents.expert.writers.base.ThoughtWriter`."""
-        start = time.perf_counter()
-        thoughts = self._writer.write(request)
-        self.seconds += time.perf_counter() - start
-        return thoughts
 
 
 @click.command(help=f"\b\n{__doc__}")
@@ -47,12 +31,13 @@ class _Timed:
 @click.option("--top", default=10, show_default=True, help="How many frequent ones to print.")
 @click.option("--check", "checked", is_flag=True, help="Let the critic check each thought.")
 def main(episodes: int, language: Language, suite: str, seed: int, top: int, checked: bool) -> None:
-    writer = _Timed(WRITERS.get("grounded")())
+    writer, requests = WRITERS.get("grounded")(), list[ThoughtRequest]()
     said, thoughts = Counter[str](), Counter[str]()
     lengths: list[int] = []
     refused: list[tuple[Refusal, str, ThoughtRequest]] = []
     for number, (task, turns) in enumerate(played(episodes, seed, suite)):
         for request, records in written(writer, turns, task.instruction, language, number):
+            requests.append(request)
             for record, limit in zip(records, request.limits, strict=True):
                 thoughts[record.text] += 1
                 said.update(sentences(record.text, language))
@@ -60,12 +45,13 @@ def main(episodes: int, language: Language, suite: str, seed: int, top: int, che
                 if checked:
                     found = check(record.text, record.kind, request.knowledge, limit=limit)
                     refused += [(each, record.text, request) for each in found]
+    seconds = timed(lambda: [writer.write(request) for request in requests]).clock
     total, cuts = sum(thoughts.values()), statistics.quantiles(lengths, n=20)
     print(f"episodes {episodes:,}, thoughts {total:,}, sentences {sum(said.values()):,}")
     print(f"distinct sentences {len(said) / sum(said.values()):.1%}")
     print(f"distinct thoughts {len(thoughts) / total:.1%}")
     print(f"words a thought: median {statistics.median(lengths)}, 5 % {cuts[0]}, 95 % {cuts[-1]}")
-    print(f"milliseconds a thought {1000 * writer.seconds / total:.2f}")
+    print(f"milliseconds a thought {1000 * seconds / total:.2f}")
     for name, counts in (("thoughts", thoughts), ("sentences", said)):
         print(f"most frequent {name}:")
         for text, count in counts.most_common(top):

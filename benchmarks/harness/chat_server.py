@@ -21,8 +21,6 @@ from typing import Any
 from er_gym.tasks.task import Task
 
 SAID = "<DecisionMaking>end</DecisionMaking>"
-TOKENS = 59
-"""Of a request and its answer, as the server counts them unless it is told otherwise."""
 DELETE = object()
 
 Messages = Sequence[Mapping[str, Any]]
@@ -103,7 +101,7 @@ def completion(**changed: Any) -> dict[str, Any]:
                 "finish_reason": "stop",
             }
         ],
-        "usage": {"prompt_tokens": TOKENS - 9, "completion_tokens": 9, "total_tokens": TOKENS},
+        "usage": {"prompt_tokens": 50, "completion_tokens": 9, "total_tokens": 59},
     }
     for path, value in changed.items():
         place = answer
@@ -131,7 +129,7 @@ ok = body(GOOD)
 
 def error(status: int, message: str = "no", **headers: str) -> Fault:
     """An error in OpenAI's form."""
-    return body(json.dumps({"error": {"message": message}}).encode(), status, **headers)
+    return body(json.dumps({"error": {"message": message}}).encode(), status, None, **headers)
 
 
 def replies(
@@ -155,12 +153,12 @@ def replies(
 
     def fault(exchange: Exchange) -> None:
         arrived = time.monotonic()
-        words, counts = say(exchange.messages), {}
+        words, usage = say(exchange.messages), {}
         if tokens is not None:
             heard, said = tokens(exchange.body, words)
             told = {"prompt_tokens": heard, "completion_tokens": said, "total_tokens": heard + said}
-            counts = {"usage": told}
-        made = completion(choices__0__message__content=words, **counts, **changed)
+            usage = {"usage": told}
+        made = completion(choices__0__message__content=words, **usage, **changed)
         answer = json.dumps(made).encode()
         exchange.chat_server.closing.wait(max(0.0, latency - (time.monotonic() - arrived)))
         exchange.send(answer, headers={"Connection": "keep-alive"} if keep else None)
@@ -183,6 +181,11 @@ def drawn(faults: Mapping[str, tuple[float, Fault]], seed: int) -> Fault:
         faults[name][1](exchange)
 
     return fault
+
+
+def counts(prompt: int, completion: int) -> Callable[[bytes, str], tuple[int, int]]:
+    """So many tokens of every request and reply; see :func:`replies`."""
+    return lambda heard, said: (prompt, completion)
 
 
 def key_actions(tasks: Iterable[Task]) -> Callable[[Messages], str]:

@@ -27,12 +27,13 @@ from typing import Any
 import click
 
 from agents import NamedAgent, make_agent
+from benchmarks.harness.measuring import in_turns, timed
 from er_gym import __version__
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.cluster.actors import resident_memory
 from er_gym.rollout.cluster.session import ray_machines
 from er_gym.rollout.cluster.settings import RaySettings
-from er_gym.rollout.events import EpisodeEnded, Event
+from er_gym.rollout.events import read_events
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.machines import THIS_MACHINE, Machines
 from er_gym.rollout.play import play_episode
@@ -120,19 +121,16 @@ def _actors(episodes: int, picture_episodes: int, rounds: int) -> None:
     with ray_machines(RaySettings(), print) as ray:
         for name, obs_mode, number in kinds:
             tasks = suite.tasks[:: max(1, len(suite.tasks) // number)][:number]
-            ways: dict[str, tuple[Machines, int]] = {
-                "two processes": (THIS_MACHINE, 2),
-                "one process": (THIS_MACHINE, 1),
-                "two actors": (ray, 2),
-                "one actor": (ray, 1),
+            ways = {
+                "two processes": partial(_play, tasks, obs_mode, THIS_MACHINE, 2),
+                "one process": partial(_play, tasks, obs_mode, THIS_MACHINE, 1),
+                "two actors": partial(_play, tasks, obs_mode, ray, 2),
+                "one actor": partial(_play, tasks, obs_mode, ray, 1),
             }
-            spent: dict[str, list[tuple[float, float]]] = {way: [] for way in ways}
-            for _ in range(rounds):
-                for way, (machines, workers) in ways.items():
-                    spent[way].append(_play(tasks, obs_mode, machines, workers))
+            spent = in_turns(ways, rounds)
             alone = [
-                median(_only_playing(tasks, obs_mode, number) for _ in range(rounds))
-                for number in (1, 2)
+                median(_only_playing(tasks, obs_mode, processes) for _ in range(rounds))
+                for processes in (1, 2)
             ]
             whole = {way: median(seconds for seconds, _ in each) for way, each in spent.items()}
             speed = {way: median(rate for _, rate in each) for way, each in spent.items()}
@@ -161,6 +159,11 @@ def _played(tasks: Sequence[Any], obs_mode: str) -> float:
     for task in tasks:
         play_episode(env, make_agent("oracle"), task, 0)
         ended.append(time.perf_counter())
+    return _middle_rate(ended)
+
+
+def _middle_rate(ended: Sequence[float]) -> float:
+    """Episodes a second in the middle half of some, by the times of their ends."""
     first, last = len(ended) // 4, 3 * len(ended) // 4
     return (last - first) / (ended[last] - ended[first])
 
@@ -181,17 +184,10 @@ def _play(
     with tempfile.TemporaryDirectory() as folder:
         directory = RunDirectory.create(Path(folder) / "run", manifest)
         size = replace(Parallelism(workers), machines=machines)
-        ended: list[float] = []
-
-        def note(event: Event) -> None:
-            if isinstance(event, EpisodeEnded):
-                ended.append(time.perf_counter())
-
-        start = time.perf_counter()
-        run(directory, tasks, NamedAgent("oracle"), parallelism=size, listeners=[note])
-        spent = time.perf_counter() - start
-        first, last = len(ended) // 4, 3 * len(ended) // 4
-        return spent, (last - first) / (ended[last] - ended[first])
+        play = partial(run, directory, tasks, NamedAgent("oracle"), parallelism=size)
+        spent = timed(play).clock
+        ended = [event.time for event in read_events(directory.path, ["episode_ended"])]
+        return spent, _middle_rate(ended)
 
 
 if __name__ == "__main__":

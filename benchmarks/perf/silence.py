@@ -20,7 +20,7 @@ from pathlib import Path
 
 import click
 
-from benchmarks.harness.chat_server import ChatServer, key_actions, replies
+from benchmarks.harness.chat_server import ChatServer, counts, key_actions, replies
 from benchmarks.harness.output import ROOT, Output, write_figures
 from benchmarks.harness.processes import TerminalRun, plain_environment, run
 from er_gym.tasks.suites import load_suite
@@ -175,7 +175,8 @@ def main(names: tuple[str, ...], repo: Path, python: Path, out: Path | None) -> 
     figures: dict[str, dict[str, float]] = {}
     short = 0
     print(f"{'':16} {'first word':>10} {'silence':>8} {'in all':>7}  seconds")
-    speaks = replies(key_actions(load_suite("mini").tasks), latency=0.05, keep=True)
+    say, tokens = key_actions(load_suite("mini").tasks), counts(400, 20)
+    speaks = replies(say, latency=0.05, keep=True, tokens=tokens)
     with tempfile.TemporaryDirectory() as folder, ChatServer(speaks) as server:
         work = Path(folder)
         for row in in_order(names):
