@@ -17,21 +17,8 @@ from pathlib import Path
 import click
 import numpy as np
 
+from benchmarks.checks.comparisons import captured, recorded
 from benchmarks.checks.comparisons import reachable as standing
-from benchmarks.checks.comparisons.containment import containment
-from benchmarks.checks.comparisons.placement import random_placements
-from benchmarks.checks.comparisons.poses import openable_poses
-from benchmarks.checks.comparisons.reachable import (
-    BEFORE,
-    LARGER,
-    POSITIONS,
-    agreements,
-    by_kind,
-    reachable,
-    sample,
-)
-from benchmarks.checks.comparisons.room import WITHIN, held_out, rooms
-from benchmarks.checks.comparisons.visibility import visible_objects
 from benchmarks.harness.output import SHARED, json_option, print_table, write_figures
 from er_gym.sim.space.walkable_floor import Rules
 
@@ -51,7 +38,7 @@ class Row:
 
 def recorded_rows() -> Iterator[Row]:
     """The comparisons with what the packaged scene tables hold."""
-    floor = reachable()
+    floor = standing.reachable()
     yield Row(
         "at 0.25 m: scenes with all recorded positions",
         f"{floor.recorded} of 120", "120", floor.recorded == 120,
@@ -65,17 +52,17 @@ def recorded_rows() -> Iterator[Row]:
         "at 0.1 m: scenes connected as recorded, or better",
         f"{floor.connected} of 120", "120", floor.connected == 120,
     )  # fmt: skip
-    larger = floor.fine / BEFORE
+    larger = floor.fine / standing.BEFORE
     yield Row(
         "at 0.1 m: positions, as a multiple of those between recorded ones",
-        f"{larger:.2f}", f"{LARGER} ± 10 %", abs(larger / LARGER - 1) <= 0.1,
+        f"{larger:.2f}", f"{standing.LARGER} ± 10 %", abs(larger / standing.LARGER - 1) <= 0.1,
     )  # fmt: skip
-    agreed, entries = np.sum([*openable_poses().values()], axis=0)
+    agreed, entries = np.sum([*recorded.openable_poses().values()], axis=0)
     yield _share("poses of openable things: interactable", agreed, entries, 0.90)
-    found = containment()
+    found = recorded.containment()
     yield _share("containment: innermost receptacle", found.innermost, found.objects, 0.95)
     yield _share("containment: all receptacles", found.all_of_them, found.objects)
-    put = random_placements(PLACEMENTS_EACH)
+    put = recorded.random_placements(PLACEMENTS_EACH)
     yield Row(
         "placements that run into something",
         f"{len(put.clashes)} of {put.placed}", "0", not put.clashes,
@@ -89,9 +76,9 @@ def recorded_rows() -> Iterator[Row]:
 
 def sampled_rows(positions_file: Path) -> Iterator[Row]:
     """The comparison with positions that AI2-THOR 5 gave as reachable."""
-    given = sample(positions_file)
-    shipped = by_kind(agreements(given, Rules()))
-    for kind, apart in by_kind(standing.held_out(given)).items():
+    given = standing.sample(positions_file)
+    shipped = standing.by_kind(standing.agreements(given, Rules()))
+    for kind, apart in standing.by_kind(standing.held_out(given)).items():
         name = kind.replace("_", " ")
         yield _share(f"AI2-THOR's positions, {name}", shipped[kind].found, shipped[kind].given)
         yield _share(f"... by the other scenes, {name}", apart.found, apart.given, 0.92)
@@ -104,12 +91,12 @@ def sampled_rows(positions_file: Path) -> Iterator[Row]:
 def captured_rows(captures_file: Path) -> Iterator[Row]:
     """The comparisons with views of AI2-THOR 5."""
     captures = json.loads(captures_file.read_text())
-    seen = visible_objects(captures)
+    seen = captured.visible_objects(captures)
     yield Row("visible objects: F1", f"{seen.f1:.3f}", "≥ 0.95", seen.f1 >= 0.95)
     yield Row("visible objects: precision, recall", f"{seen.precision:.3f}, {seen.recall:.3f}")
-    halves = [visible_objects(captures, list(captures)[start::2]).f1 for start in (0, 1)]
+    halves = [captured.visible_objects(captures, list(captures)[start::2]).f1 for start in (0, 1)]
     yield Row("visible objects: F1 of every other scene", "{:.3f}, {:.3f}".format(*halves))
-    found = rooms(captures)
+    found = captured.rooms(captures)
     for name, gaps in (("agent's height", found.agent), ("camera's height", found.camera)):
         farthest = float(abs(gaps).max())
         yield Row(
@@ -121,7 +108,7 @@ def captured_rows(captures_file: Path) -> Iterator[Row]:
         f"{right} of {len(captures)}", str(len(captures)), right == len(captures),
     )  # fmt: skip
     yield Row("room bounds: faces within 0.25 m", f"{found.faces_right:.3f}")
-    apart = [abs(off).max() <= WITHIN for off in held_out(captures).values()]
+    apart = [abs(off).max() <= captured.WITHIN for off in captured.held_out(captures).values()]
     yield Row("room bounds: scenes, by the other scenes", f"{sum(apart)} of {len(apart)}")
 
 
@@ -141,7 +128,7 @@ def _share(name: str, part: int, whole: int, bound: float | None = None) -> Row:
 def main(shared: Path, file: Path | None) -> None:
     """Compare, and print the table; takes about a minute."""
     rows, left_out = list(recorded_rows()), []
-    for name, compared in ((CAPTURES, captured_rows), (POSITIONS, sampled_rows)):
+    for name, compared in ((CAPTURES, captured_rows), (standing.POSITIONS, sampled_rows)):
         if (shared / name).exists():
             rows += compared(shared / name)
         else:

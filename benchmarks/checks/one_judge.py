@@ -15,7 +15,7 @@ from __future__ import annotations
 import random
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -217,13 +217,19 @@ def judge_all(tasks: Sequence[Task], protocol: str = "default", seed: int = 0) -
         env.close()
 
 
-def some_of_each_type(tasks: Sequence[Task], number: int, seed: int = 0) -> list[Task]:
-    """A number of tasks of each type, the same for the same seed."""
+def sample_of_types(
+    tasks: Iterable[Task], types: Sequence[str], each: int, seed: str = ""
+) -> list[Task]:
+    """A number of tasks of each type, the same for the same seed; all types if none is named."""
     by_type: dict[str, list[Task]] = defaultdict(list)
     for task in tasks:
-        by_type[task.type.name].append(task)
-    draw = random.Random(seed)
-    return [one for each in by_type.values() for one in draw.sample(each, min(number, len(each)))]
+        if not types or task.type.name in types:
+            by_type[task.type.name].append(task)
+    return [
+        task
+        for name, of_type in sorted(by_type.items())
+        for task in random.Random(f"{name}{seed}").sample(of_type, min(each, len(of_type)))
+    ]
 
 
 @click.command()
@@ -235,7 +241,7 @@ def main(suite: str, per_type: int | None, protocol: str, seed: int) -> None:
     """Play every task of a suite with every player, and judge each episode twice."""
     tasks: Sequence[Task] = load_suite(suite).tasks
     if per_type is not None:
-        tasks = some_of_each_type(tasks, per_type, seed)
+        tasks = sample_of_types(tasks, (), per_type, f" {seed}")
     counts: dict[str, Counter[str]] = {player: Counter() for player in PLAYERS}
     episodes = judge_all(tasks, protocol, seed)
     for found in progress(episodes, "Judging", len(tasks) * len(PLAYERS)):

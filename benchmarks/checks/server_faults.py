@@ -192,7 +192,7 @@ class Run:
         name: of the run.
         fault: the name of the fault.
         options: of the command.
-        says: the texts that it should print, on either stream.
+        says: the text that it should print, on either stream.
         seconds: its time limit.
         crashed: how many episodes may be recorded as crashed.
         good_first: how many requests are answered well first.
@@ -201,8 +201,8 @@ class Run:
 
     name: str
     fault: str
-    options: tuple[str, ...] = ()
-    says: str = "the same command"
+    options: str
+    says: str
     seconds: float = 60.0
     crashed: int = 0
     good_first: int = 0
@@ -214,73 +214,39 @@ class Run:
         return 130 if self.interrupt else 3
 
 
-_QUICK = ("--set", "server.tries=2", "--set", "server.timeout=2")
-_ALONE = ("--concurrency", "1")
+_QUICK = "--set server.tries=2 --set server.timeout=2"
+_HANGS, _LONG_WAIT = "hangs before the head", "answers 503, Retry-After '300'"
+_DEAD, _SPENT, _OVER = "requests in a row", "the budget is spent", "0.05 minutes are over"
+_AGAIN = "trying again in 5 min"
 RUNS = [
-    Run("a dead server", "hangs up", _QUICK, says="requests in a row", crashed=2, good_first=6),
-    Run(
-        "a dead server, one by one",
-        "answers 500",
-        (*_QUICK, *_ALONE),
-        says="requests in a row",
-        crashed=2,
-    ),
-    Run("a server that hangs", "hangs before the head", _QUICK, says="nothing has answered yet"),
-    Run(
-        "minutes end a request",
-        "hangs before the head",
-        ("--max-minutes", "0.05"),
-        says="0.05 minutes are over",
-    ),
-    Run(
-        "minutes end a drip",
-        "drips the body",
-        ("--max-minutes", "0.05"),
-        says="0.05 minutes are over",
-    ),
-    Run(
-        "a wait beyond the minutes",
-        "answers 503, Retry-After '300'",
-        ("--max-minutes", "4"),
-        says="asks to wait 5 min, and",
-    ),
-    Run(
-        "a long wait without minutes",
-        "answers 503, Retry-After '300'",
-        (),
-        says="give --max-minutes",
-    ),
+    Run("a dead server", "hangs up", _QUICK, _DEAD, crashed=2, good_first=6),
+    Run("a dead server, one by one", "answers 500", f"{_QUICK} --concurrency 1", _DEAD, crashed=2),
+    Run("a server that hangs", _HANGS, _QUICK, "nothing has answered yet"),
+    Run("minutes end a request", _HANGS, "--max-minutes 0.05", _OVER),
+    Run("minutes end a drip", "drips the body", "--max-minutes 0.05", _OVER),
+    Run("a wait beyond the minutes", _LONG_WAIT, "--max-minutes 4", "asks to wait 5 min, and"),
+    Run("a long wait without minutes", _LONG_WAIT, "", "give --max-minutes"),
     Run(
         "a long wait that the minutes allow",
-        "answers 503, Retry-After '300'",
-        ("--max-minutes", "90"),
-        says="trying again in 5 min",
-        interrupt="trying again in 5 min",
+        _LONG_WAIT,
+        "--max-minutes 90",
+        _AGAIN,
+        interrupt=_AGAIN,
     ),
     Run(
         "Ctrl-C while it hangs",
-        "hangs before the head",
-        ("--set", "server.timeout=120"),
-        says="interrupted",
+        _HANGS,
+        "--set server.timeout=120",
+        "interrupted",
         interrupt="no answer for",
     ),
-    Run(
-        "tokens that are not counted",
-        "sends no token counts",
-        ("--max-tokens", "20000"),
-        says="the budget is spent",
-    ),
-    Run(
-        "tokens given back",
-        "counts -1000000 of both",
-        ("--max-usd", "0.02"),
-        says="the budget is spent",
-    ),
+    Run("tokens that are not counted", "sends no token counts", "--max-tokens 20000", _SPENT),
+    Run("tokens given back", "counts -1000000 of both", "--max-usd 0.02", _SPENT),
     Run(
         "answers that are rejected",
         "sends choices []",
-        ("--max-usd", "0.02", "--set", "server.tries=9"),
-        says="the budget is spent",
+        "--max-usd 0.02 --set server.tries=9",
+        _SPENT,
     ),
 ]
 
@@ -296,7 +262,7 @@ def _run_problems(run: Run) -> Iterator[str]:
             *ER_GYM, "bench", "--suite", "mini", "--limit", "40",
             "--agent", "openai:m", "--agent-config", "text", "--base-url", server.url,
             "--set", f"server.key_from={_KEY_FROM}", "--set", "prices.prompt=2",
-            "--set", "prices.completion=10", "--out", directory, *run.options,
+            "--set", "prices.completion=10", "--out", directory, *run.options.split(),
         ]  # fmt: skip
         until = re.escape(run.interrupt)
         done = processes.run(

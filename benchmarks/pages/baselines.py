@@ -13,11 +13,10 @@ import json
 import platform
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from random import Random
 
 import click
 import numpy as np
@@ -28,12 +27,15 @@ from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig, how_learnt, load_config
 from agents.rl.policy_file import MODEL
 from agents.rl.policy_observation import IMAGES
+from benchmarks.checks.one_judge import sample_of_types
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import force_option
 from benchmarks.cli.progress import Progress
+from benchmarks.harness.output import ROOT
 from benchmarks.scoring.curves import draw_curves
 from benchmarks.scoring.metrics import Score, score_episode, wilson
 from benchmarks.scoring.scorers import CORRECTED
+from benchmarks.scoring.tables import Table, as_markdown
 from er_gym import __version__
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.outcomes import Outcomes
@@ -48,7 +50,6 @@ UNSEEN = "er-1k"
 _EACH = 91
 """As many tasks of a type as er-1k has."""
 _SEED = 0
-_DOCS = Path(__file__).resolve().parents[2] / "docs"
 _SCRIPTED = ("random", "searcher", "oracle")
 
 
@@ -157,19 +158,6 @@ def _picture_size(agent: str) -> dict[str, int]:
     return {"width": options.width, "height": options.height} if sees else {}
 
 
-def sample_of_types(tasks: Iterable[Task], types: Sequence[str], each: int) -> list[Task]:
-    """A number of tasks of each type, the same every time; all types if none is named."""
-    by_type = defaultdict(list)
-    for task in tasks:
-        if not types or task.type.name in types:
-            by_type[task.type.name].append(task)
-    return [
-        task
-        for name in sorted(by_type)
-        for task in Random(name).sample(by_type[name], min(each, len(by_type[name])))
-    ]
-
-
 def rates(scores: Sequence[Score]) -> dict[str, tuple[int, int]]:
     """Successes and episodes: of "all", and of each group that was played."""
     found = {"all": (sum(score.success for score in scores), len(scores))}
@@ -204,7 +192,7 @@ def machine() -> str:
 @click.option("--work", type=click.Path(path_type=Path), default=Path("runs/baselines"))
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True)
 @click.option("--each", type=click.IntRange(min=1), default=_EACH, help="Tasks of a type.")
-@click.option("--out", type=click.Path(path_type=Path), default=_DOCS / "baselines.md")
+@click.option("--out", type=click.Path(path_type=Path), default=ROOT / "docs" / "baselines.md")
 @force_option
 def main(
     runs: tuple[Path, ...],
@@ -261,6 +249,16 @@ def _section(name: str, members: Sequence[TrainedRun], results: Results) -> str:
     config = members[0].config
     minutes = [each.minutes for each in members]
     groups = [group for group in GROUPS if group in results["unseen"]["trained"][0]]
+    rows = [
+        (
+            name if agent == "trained" else agent,
+            _percent(results["training"][agent], "all"),
+            _percent(results["unseen"][agent], "all"),
+            *(_percent(results["unseen"][agent], group) for group in groups),
+        )
+        for agent in ("trained", *_SCRIPTED)
+    ]
+    head = ("Agent", "Training rooms", "Unseen rooms", *(f"{group}, unseen" for group in groups))
     lines = [
         f"## {name}",
         "",
@@ -268,21 +266,10 @@ def _section(name: str, members: Sequence[TrainedRun], results: Results) -> str:
         f"{_span(minutes)} minutes; seeds {', '.join(str(each.config.seed) for each in members)}. "
         f"Types: {', '.join(config.env.types) or 'all'}.",
         "",
-        "| Agent | Training rooms | Unseen rooms | "
-        + " | ".join(f"{group}, unseen" for group in groups)
-        + " |",
-        "| --- " * (3 + len(groups)) + "|",
+        as_markdown([Table("Success, in %", head, tuple(rows), text_columns=1)]),
     ]
-    for agent in ("trained", *_SCRIPTED):
-        cells = [
-            _percent(results["training"][agent], "all"),
-            _percent(results["unseen"][agent], "all"),
-            *(_percent(results["unseen"][agent], group) for group in groups),
-        ]
-        lines.append(f"| {name if agent == 'trained' else agent} | {' | '.join(cells)} |")
     n = results["unseen"]["trained"][0]["all"][1], results["training"]["trained"][0]["all"][1]
     lines += [
-        "",
         f"{n[1]} tasks in training rooms, {n[0]} in unseen ones. "
         "These commands train the policies:",
         "",

@@ -20,6 +20,7 @@ from rich.progress import track
 
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import force_option
+from benchmarks.harness.output import ROOT
 from er_gym.sim.actions import perform
 from er_gym.sim.agent import Agent
 from er_gym.sim.render.appearance import Appearance, compute_appearance
@@ -39,7 +40,7 @@ from er_gym.writing import (
     write_picture,
 )
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+DOCS = ROOT / "docs"
 _SIDE, _LABEL, _COLUMNS = 150, 15, 10
 _ROOM = (640, 400)
 _ROOMS = {"kitchens": (1, 27), "living_rooms": (212, 227), "bedrooms": (301, 315),

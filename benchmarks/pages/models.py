@@ -22,6 +22,7 @@ from benchmarks.ablation.result import read_study, study_table
 from benchmarks.ablation.settings import AblationSettings
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import force_option
+from benchmarks.harness.output import ROOT
 from benchmarks.ladder.chart import draw_ladder
 from benchmarks.ladder.phases import Rung, plan_of, rungs
 from benchmarks.ladder.result import read_results, result_tables
@@ -39,7 +40,6 @@ from er_gym.writing import MARKDOWN_MARK, check_output, write_output
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_DOCS = Path(__file__).resolve().parents[2] / "docs"
 _COLOURS = ("#2470ad", "#2a8c82", "#b5762a", "#54278f", "#a33b4a")
 _SMOOTH = 0.9
 """The share that the mean of the losses before has in a point of the curve."""
@@ -95,7 +95,7 @@ class Climbed:
     metavar="NAME DIR",
     help="Another run of er-gym bench for the table of generalisation, and who played it.",
 )
-@click.option("--out", type=click.Path(path_type=Path), default=_DOCS / "models.md")
+@click.option("--out", type=click.Path(path_type=Path), default=ROOT / "docs" / "models.md")
 @force_option
 def main(
     ladders: tuple[Path, ...],

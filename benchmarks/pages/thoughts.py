@@ -13,13 +13,13 @@ from random import Random
 import click
 from PIL import Image
 
+from benchmarks.harness.output import ROOT
 from er_gym.data.collection import Collection
 from er_gym.data.pictures import open_picture
 from er_gym.data.trajectory import THOUGHT_KINDS, ThoughtRecord, Trajectory, Turn
 
-_ROOT = Path(__file__).resolve().parents[2]
-_PAGE = _ROOT / "docs" / "data.md"
-_PICTURES = _ROOT / "docs" / "images" / "thoughts"
+_PAGE = ROOT / "docs" / "data.md"
+_PICTURES = ROOT / "docs" / "images" / "thoughts"
 _EACH = 2
 """How many thoughts of each kind."""
 _SIZE = (400, 225)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from benchmarks.checks.one_judge import PLAYERS, judge_twice, some_of_each_type
+from benchmarks.checks.one_judge import PLAYERS, judge_twice, sample_of_types
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.report import load_run
 from benchmarks.scoring.scorers import CORRECTED
@@ -29,7 +29,7 @@ def text_env() -> Iterator[EmbodiedEnv]:
 
 @pytest.mark.parametrize("player", PLAYERS)
 def test_env_and_corrected_scorer_agree(text_env: EmbodiedEnv, player: str) -> None:
-    tasks = some_of_each_type(ER_1K, 1)
+    tasks = sample_of_types(ER_1K, (), 1)
     assert {task.type for task in tasks} == set(TASK_TYPES)
     judged = [judge_twice(text_env, task, player) for task in tasks]
     assert [(each.record.task_id, each.apart) for each in judged if each.apart] == []
@@ -37,7 +37,7 @@ def test_env_and_corrected_scorer_agree(text_env: EmbodiedEnv, player: str) -> N
 
 def test_they_agree_under_the_papers_protocol() -> None:
     env = EmbodiedEnv([], obs_mode="text", protocol="paper")
-    judged = [judge_twice(env, task, "oracle") for task in some_of_each_type(ER_1K, 1)[:4]]
+    judged = [judge_twice(env, task, "oracle") for task in sample_of_types(ER_1K, (), 1)[:4]]
     env.close()
     assert [each.apart for each in judged] == [()] * 4
 

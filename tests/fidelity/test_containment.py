@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.checks.comparisons.containment import containment
+from benchmarks.checks.comparisons.recorded import containment
 
 
 def test_receptacles_agree_with_the_record() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.checks.comparisons.placement import Placements, clashes, random_placements
+from benchmarks.checks.comparisons.recorded import Placements, clashes, random_placements
 from er_gym.sim.actions.pick_place import put_down
 from er_gym.sim.scene import load_scene
 from er_gym.sim.settings import Settings

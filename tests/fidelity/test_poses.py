@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.checks.comparisons.poses import openable_poses
+from benchmarks.checks.comparisons.recorded import openable_poses
 
 
 def share(found: dict[str, tuple[int, int]]) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.checks.comparisons.room import WITHIN, Rooms, faces, held_out, rooms
+from benchmarks.checks.comparisons.captured import WITHIN, Rooms, faces, held_out, rooms
 from er_gym.sim.scene import load_scene
 from er_gym.sim.space.room_bounds import room_bounds
 

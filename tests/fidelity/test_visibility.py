@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.checks.comparisons.visibility import visible_objects
+from benchmarks.checks.comparisons.captured import visible_objects
 
 
 def test_visible_objects_agree_with_recorded_views(captures) -> None:

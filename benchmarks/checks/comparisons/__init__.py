@@ -1,1 +1,1 @@
-"""Compares the embedded engine with AI2-THOR's recordings: one comparison a file, no verdicts."""
+"""Compares the embedded engine with AI2-THOR's recordings, without verdicts: a source a file."""

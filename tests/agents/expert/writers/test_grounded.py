@@ -17,7 +17,7 @@ from agents.expert.writers.grammar import Rule, Writing, grammar, parse
 from agents.expert.writers.grounded import GroundedWriter, sentences, words
 from agents.expert.writers.nouns import names, nouns
 from agents.expert.writers.registry import WRITERS
-from benchmarks.checks.thought_episodes import played, written
+from benchmarks.checks.thought_variety import played, written
 from er_gym.data.critic import check
 from er_gym.data.knowledge import AROUND, Knowledge, LastAction, knowledge_at
 from er_gym.data.trajectory import TAG_OF_KIND, THOUGHT_KINDS, Language, Purpose, Subgoal, Turn

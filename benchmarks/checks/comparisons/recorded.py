@@ -1,7 +1,12 @@
-"""Random placements: whether an object that is put down overlaps others, and where it is put."""
+"""Compares the embedded engine with what its packaged scene tables hold of AI2-THOR's scenes.
+
+The receptacles of objects, from geometry alone; the poses from which AI2-THOR opened things; and
+random placements, which must overlap nothing.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,11 +16,81 @@ from er_gym.sim.agent import Agent
 from er_gym.sim.placement_restrictions import accepts
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.settings import Settings
+from er_gym.sim.space.interactable_poses import interactable_poses
 from er_gym.sim.space.placement import free_spots, is_vessel, surface_height
+from er_gym.sim.space.receptacles import receptacles_of
+from er_gym.sim.space.recorded_floor import RECORDED_STEP
 from er_gym.sim.space.solids import solid_of
+from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
 
 _TOUCH = 0.005
+
+
+def _worlds() -> Iterator[World]:
+    return (World.load(load_scene(name), Settings()) for name in SCENE_NAMES)
+
+
+@dataclass(frozen=True)
+class Containment:
+    """Counts of pickupable objects over the 120 scenes.
+
+    Attributes:
+        objects: all of them.
+        innermost: those whose innermost receptacle, worked out, is one that the record names; or
+            neither has any.
+        all_of_them: those for which the two name the same receptacles.
+    """
+
+    objects: int
+    innermost: int
+    all_of_them: int
+
+
+def containment(lift: float = 0.0) -> Containment:
+    """Compare; ``lift`` raises each object by so many metres, for a comparison that has to fail."""
+    objects = innermost = all_of_them = 0
+    for world in _worlds():
+        for i in range(len(world)):
+            if not world.has(i, "pickupable"):
+                continue
+            world.low[i, 1] += lift
+            world.high[i, 1] += lift
+            found, recorded = receptacles_of(world, i), set(world.parents[i])
+            world.low[i, 1] -= lift
+            world.high[i, 1] -= lift
+            objects += 1
+            innermost += found[0] in recorded if found else not recorded
+            all_of_them += set(found) == recorded
+    return Containment(objects, innermost, all_of_them)
+
+
+def openable_poses(turn: float = 0.0) -> dict[str, tuple[int, int]]:
+    """Type to (how many entries agree, how many there are), over the 120 scenes.
+
+    An entry agrees when the object is interactable from its pose, or one within a step of the
+    grid with the same rotation and horizon is among the object's interactable poses: agent
+    standing, visibility distance 1.5 m, field of view 90 degrees.
+
+    Args:
+        turn: degrees to turn the recorded headings by, for a comparison that has to fail.
+    """
+    found: dict[str, tuple[int, int]] = {}
+    for world in _worlds():
+        height = world.agent.position[1]
+        for i, pose in world.scene.openable_poses.items():
+            rotation = pose.rotation + turn
+            here = np.array([pose.x, height, pose.z])
+            agrees = bool(visible(world, Agent(here, rotation, pose.horizon))[i])
+            if not agrees:
+                gaps = np.linalg.norm(world.scene.reachable - here[[0, 2]], axis=1)
+                near = world.scene.reachable[gaps <= RECORDED_STEP + 1e-6]
+                agrees = bool(
+                    interactable_poses(world, i, near, [rotation], [pose.horizon], [True], 1).size
+                )
+            agreed, entries = found.get(world.types[i], (0, 0))
+            found[world.types[i]] = agreed + agrees, entries + 1
+    return found
 
 
 @dataclass
@@ -38,8 +113,7 @@ class Placements:
 def random_placements(each: int, seed: int = 0) -> Placements:
     """Put ``each`` things in each of the 120 scenes, one after the other, by a seed."""
     random, found = np.random.default_rng(seed), Placements()
-    for name in SCENE_NAMES:
-        world = World.load(load_scene(name), Settings())
+    for world in _worlds():
         things = [i for i in range(len(world)) if world.has(i, "pickupable")]
         receptacles = [r for r in range(len(world)) if world.has(r, "receptacle")]
         for _ in range(each):
