@@ -10,6 +10,8 @@ import contextlib
 import hashlib
 import json
 import random
+import select
+import socket
 import threading
 import time
 from collections import Counter
@@ -70,6 +72,12 @@ class Exchange(BaseHTTPRequestHandler):
             with self.chat_server.lock:
                 self.chat_server.accepted += 1
         self.raw(head(len(body), status, headers) + body)
+
+    def has_gone(self) -> bool:
+        """Whether the client has hung up; then the connection is closed."""
+        ready, _, _ = select.select([self.connection], [], [], 0)
+        self.close_connection = bool(ready) and not self.connection.recv(1, socket.MSG_PEEK)
+        return self.close_connection
 
     def log_message(self, format: str, *args: Any) -> None:
         """Say nothing."""
@@ -161,10 +169,12 @@ def replies(
         made = completion(choices__0__message__content=words, **usage, **changed)
         answer = json.dumps(made).encode()
         exchange.chat_server.closing.wait(max(0.0, latency - (time.monotonic() - arrived)))
-        exchange.send(answer, headers={"Connection": "keep-alive"} if keep else None)
-        exchange.close_connection = not keep
+        if exchange.has_gone():
+            return
         with exchange.chat_server.lock:
             exchange.chat_server.answered[hashlib.sha256(exchange.body).digest()] += 1
+        exchange.send(answer, headers={"Connection": "keep-alive"} if keep else None)
+        exchange.close_connection = not keep
 
     return fault
 

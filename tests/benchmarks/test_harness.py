@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import socket
+import time
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -86,7 +88,7 @@ def test_figures_go_into_a_table_and_into_a_file(tmp_path: Path, capsys):
 
 
 def test_a_command_is_interrupted_once_it_has_said_what_is_waited_for(tmp_path: Path):
-    script = "trap 'echo over; exit 7' INT; echo ready; echo oops >&2; sleep 30 & wait"
+    script = "trap 'echo over; exit 7' INT; echo ready; echo oops >&2; while :; do sleep 0.1; done"
     done = run(["bash", "-c", script], cwd=tmp_path, terminal=False, until="ready")
     assert (done.code, done.late) == (7, False)
     assert done.text("out") == "ready\nover\n"
@@ -119,14 +121,11 @@ def test_a_server_replies_with_the_next_key_action_and_counts():
     first = f"{task.key_actions[0].verb} {task.key_actions[0].actual_type}"
     fault = replies(key_actions([task]), keep=True, tokens=counts(400, 20))
     with ChatServer(fault) as server:
-        answer = ask(server.url, task.instruction)
-        assert (
-            f"<DecisionMaking>{first}</DecisionMaking>"
-            in answer["choices"][0]["message"]["content"]
-        )
-        assert answer["usage"]["total_tokens"] == 420
-        last = ask(server.url, task.instruction, *["", "again"] * 40)
-        assert "<DecisionMaking>end<" in last["choices"][0]["message"]["content"]
+        words, tokens = ask(server.url, task.instruction)
+        assert f"<DecisionMaking>{first}</DecisionMaking>" in words
+        assert tokens == 420
+        words, _ = ask(server.url, task.instruction, *["", "again"] * 40)
+        assert "<DecisionMaking>end</DecisionMaking>" in words
         assert (server.count, server.accepted, server.repeated) == (2, 2, 0)
         ask(server.url, task.instruction)
         assert server.repeated == 1
@@ -148,3 +147,14 @@ def test_faults_are_drawn_by_weight_and_seed():
 
     assert courses(1) == courses(1)
     assert 0 < courses(1).count(503) < 12
+
+
+def test_who_has_hung_up_gets_no_reply():
+    with ChatServer(replies(lambda _: "too late", latency=0.5)) as server:
+        host, port = server.url.removeprefix("http://").removesuffix("/v1").split(":")
+        with socket.create_connection((host, int(port))) as client:
+            body = b'{"messages": []}'
+            client.sendall(b"POST / HTTP/1.1\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body))
+        time.sleep(1.0)
+        assert (server.count, server.accepted, server.repeated) == (1, 0, 0)
+        assert not server.answered
