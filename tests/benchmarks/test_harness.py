@@ -88,7 +88,7 @@ def test_figures_go_into_a_table_and_into_a_file(tmp_path: Path, capsys):
 
 
 def test_a_command_is_interrupted_once_it_has_said_what_is_waited_for(tmp_path: Path):
-    script = "trap 'echo over; exit 7' INT; echo ready; echo oops >&2; while :; do sleep 0.1; done"
+    script = "trap 'echo over; exit 7' INT; echo oops >&2; echo ready; while :; do sleep 0.1; done"
     done = run(["bash", "-c", script], cwd=tmp_path, terminal=False, until="ready")
     assert (done.code, done.late) == (7, False)
     assert done.text("out") == "ready\nover\n"
