@@ -24,26 +24,21 @@ from pathlib import Path
 import click
 import torch
 import transformers
-from tokenizers import Tokenizer, decoders, models, pre_tokenizers, trainers
 from torch.profiler import ProfilerActivity, profile
 
+from agents.finetune.architecture import Architecture
 from agents.finetune.batches import Order
 from agents.finetune.memory import ModelNumbers, numbers_of
+from agents.finetune.new_model import make_model
 from agents.finetune.samples import open_samples
 from agents.finetune.settings import DataSettings, load_settings
 from agents.finetune.tokens import EncodedChat, Encoder
 from agents.finetune.train import train
 from benchmarks.harness.measuring import timed
 from benchmarks.harness.output import print_table
-from er_gym.data.chat import Chat
 from er_gym.data.collection import Collection
 
 WANTED = 0.6
-SPECIAL = ("<|endoftext|>", "<|im_start|>", "<|im_end|>", "<|feedback|>")
-TEMPLATE = (
-    "{% for message in messages %}<|im_start|>{{ message.role }}\n{{ message.content }}<|im_end|>\n"
-    "{% endfor %}{% if add_generation_prompt %}<|im_start|>assistant\n{% endif %}"
-)
 PARTS = {
     "matrix products": ("mm", "addmm", "bmm", "matmul", "linear"),
     "attention": ("scaled_dot_product", "flash_attention"),
@@ -65,28 +60,21 @@ def blind(collection: Collection, to: Path) -> Collection:
     return made
 
 
-def make_model(to: Path, chats: tuple[Chat, ...], hidden: int, layers: int, words: int) -> None:
-    """A Qwen2 with random weights whose tokenizer knows the words of the conversations."""
-    text = Tokenizer(models.BPE())
-    text.pre_tokenizer = pre_tokenizers.ByteLevel(add_prefix_space=False)
-    text.decoder = decoders.ByteLevel()
-    alphabet = pre_tokenizers.ByteLevel.alphabet()
-    text.train_from_iterator(
-        (turn.text for chat in chats for turn in chat.turns),
-        trainers.BpeTrainer(vocab_size=words, initial_alphabet=alphabet, show_progress=False),
+def architecture(hidden: int, layers: int, words: int) -> Architecture:
+    """A Qwen2 of this size."""
+    return Architecture(
+        family="qwen2",
+        vocabulary=words,
+        text={
+            "hidden_size": hidden,
+            "intermediate_size": 3 * hidden,
+            "num_hidden_layers": layers,
+            "num_attention_heads": max(1, hidden // 64),
+            "num_key_value_heads": max(1, hidden // 128),
+            "max_position_embeddings": 8_192,
+            "tie_word_embeddings": True,
+        },
     )
-    tokenizer = transformers.PreTrainedTokenizerFast(
-        tokenizer_object=text, eos_token="<|im_end|>", pad_token="<|endoftext|>",
-        additional_special_tokens=list(SPECIAL),
-    )  # fmt: skip
-    tokenizer.chat_template = TEMPLATE
-    tokenizer.save_pretrained(to)
-    config = transformers.Qwen2Config(
-        hidden_size=hidden, intermediate_size=3 * hidden, num_hidden_layers=layers,
-        num_attention_heads=max(1, hidden // 64), num_key_value_heads=max(1, hidden // 128),
-        vocab_size=len(tokenizer), max_position_embeddings=8_192, tie_word_embeddings=True,
-    )  # fmt: skip
-    transformers.Qwen2ForCausalLM(config).float().save_pretrained(to)
 
 
 def work_of(model: ModelNumbers, chats: list[EncodedChat]) -> float:
@@ -152,7 +140,8 @@ def main(
         folder = Path(place)
         text = blind(Collection.open(data), folder / "data")
         samples = open_samples([text.path], DataSettings(dialect=dialect, limit=limit))
-        make_model(folder / "model", samples.chats, hidden, layers, words)
+        texts = (turn.text for chat in samples.chats for turn in chat.turns)
+        make_model(architecture(hidden, layers, words), texts, folder / "model")
         tokenizer = transformers.AutoTokenizer.from_pretrained(folder / "model")
         settings = load_settings("stage1", [
             "data.parts=[]", f"data.dialect={dialect}", f"data.limit={limit or 'null'}",
@@ -160,7 +149,7 @@ def main(
             "training.checkpointing=false", "training.learning_rate=0.001",
             "training.log_every=1000", "training.save_every=100000",
         ])  # fmt: skip
-        encoder = Encoder(tokenizer, TEMPLATE, None, None, settings.data)
+        encoder = Encoder(tokenizer, tokenizer.chat_template, None, None, settings.data)
         chats = [encoder.encode(chat) for chat in samples.chats]
         model = numbers_of(transformers.AutoConfig.from_pretrained(folder / "model").to_dict())
         work = work_of(model, chats)
