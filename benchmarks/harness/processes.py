@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import math
 import os
 import pty
 import re
@@ -105,6 +106,7 @@ def run(
     until: str = "",
     keys: str = "",
     seconds: float = 300.0,
+    idle: float = math.inf,
 ) -> TerminalRun:
     """Run a command to its end, and end what it started and left behind.
 
@@ -117,6 +119,7 @@ def run(
         until: a regular expression; once the output has it, Ctrl-C is sent. For servers.
         keys: what is typed at once.
         seconds: after these it is killed.
+        idle: after so many seconds in which none of its processes had anything to do, too.
     """
     variables = plain_environment() if environment is None else environment
     start = time.monotonic()
@@ -127,10 +130,13 @@ def run(
         with selectors.DefaultSelector() as selector:
             for descriptor, name in streams.items():
                 selector.register(descriptor, selectors.EVENT_READ, name)
-            interrupted = 0.0
+            interrupted = busy = 0.0
             while selector.get_map():
                 since = time.monotonic() - start
-                if since > (interrupted + _GRACE if interrupted else seconds):
+                if idle == math.inf or any(state in "RD" for _, state in members(process.pid)):
+                    busy = since
+                limit = interrupted + _GRACE if interrupted else seconds
+                if since > limit or since > busy + idle:
                     done.late = True
                     break
                 for key, _ in selector.select(timeout=0.5):

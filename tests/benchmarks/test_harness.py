@@ -96,6 +96,8 @@ def test_a_command_is_interrupted_once_it_has_said_what_is_waited_for(tmp_path: 
     assert 0 < done.ending < 20
     late = run(["sleep", "30"], cwd=tmp_path, terminal=False, seconds=0.3)
     assert late.late
+    idle = run(["sleep", "30"], cwd=tmp_path, terminal=False, idle=0.3)
+    assert (idle.late, idle.code) == (True, -9)
     told = run(["env"], cwd=tmp_path, terminal=False, environment=plain_environment(MINE="1"))
     assert "MINE=1\n" in told.text("out")
     assert "COLUMNS=" not in told.text("out")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import math
 import os
 import re
-import resource
 import shutil
 import signal
 import subprocess
@@ -19,8 +19,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmarks.checks.planting.faults import Fault
+from benchmarks.harness import processes
 from benchmarks.harness.output import ROOT
-from benchmarks.harness.processes import end_group, members
 
 _FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
 _SETTINGS = """
@@ -30,9 +30,8 @@ data_file = {data}
 parallel = true
 patch = subprocess
 """
-_LOOK, _IDLE = 5.0, 36
-"""Seconds between two looks at the processes of a run. After so many looks in a row at which none
-of them had anything to do, the run hangs."""
+_IDLE = 180.0
+"""A run of tests hangs that has nothing to do for so many seconds."""
 
 
 @dataclass(frozen=True)
@@ -141,55 +140,40 @@ def run_tests(
             load of the machine. Tests that wait and do nothing are ended as well.
     """
 
-    def limited() -> None:
-        resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 5))
-
     with tempfile.TemporaryDirectory() as folder:
         listed = Path(folder) / "wanted"
         listed.write_text("\n".join(tests), encoding="utf-8")
-        command = [sys.executable, "-m", "pytest", "-n0", "-rfE", "-p", "no:cacheprovider"]
-        command += ["-o", "faulthandler_timeout=0"]
-        process = subprocess.Popen(
-            [*command, "--tb=line", f"--basetemp={folder}/tmp", *more, f"@{listed}"],
+        limited = ["bash", "-c", 'ulimit -t "$0" && exec "$@"', str(int(seconds) + 1)]
+        command = [
+            *limited,
+            sys.executable,
+            "-m",
+            "pytest",
+            "-n0",
+            "-rfE",
+            "-p",
+            "no:cacheprovider",
+        ]
+        command += ["-o", "faulthandler_timeout=0", "--tb=line", f"--basetemp={folder}/tmp"]
+        variables = {
+            "PYTHONPATH": f"{checkout}{os.pathsep}{ROOT}",
+            "PYTHONDONTWRITEBYTECODE": "1",
+            # The tests' own limits are on the wall clock: on a busy machine they would notice
+            # what is no fault.
+            "PYTEST_TIMEOUT": "0",
+            **environment,
+        }
+        done = processes.run(
+            [*command, *more, f"@{listed}"],
             cwd=checkout,
-            env={
-                **os.environ,
-                "PYTHONPATH": f"{checkout}{os.pathsep}{ROOT}",
-                "PYTHONDONTWRITEBYTECODE": "1",
-                # The tests' own limits are on the wall clock: on a busy machine they would notice
-                # what is no fault.
-                "PYTEST_TIMEOUT": "0",
-                **environment,
-            },
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            start_new_session=True,
-            preexec_fn=limited,
+            terminal=False,
+            environment={**os.environ, **variables},
+            seconds=math.inf,
+            idle=_IDLE,
         )
-        try:
-            output = _said(process)
-        finally:
-            end_group(process.pid)
-            process.wait()
-    code = process.returncode
-    late = code in (-signal.SIGXCPU, -signal.SIGKILL)
-    failed = _FAILED.search(output)
-    return Run(code == 0, failed[1] if failed else "", late, output)
-
-
-def _said(process: subprocess.Popen[str]) -> str:
-    """The output of a run; what it said so far is lost if it hangs."""
-    idle = 0
-    while idle < _IDLE:
-        try:
-            return process.communicate(timeout=_LOOK)[0]
-        except subprocess.TimeoutExpired:
-            # a process that runs, or waits for a processor or a disk
-            busy = any(state in "RD" for _, state in members(process.pid))
-            idle = 0 if busy else idle + 1
-    return ""
+    late = done.code in (-signal.SIGXCPU, -signal.SIGKILL)
+    failed = _FAILED.search(done.text())
+    return Run(done.code == 0, failed[1] if failed else "", late, done.text())
 
 
 def failing_of(checkout: Path, tests: Sequence[str]) -> set[str]:
