@@ -114,7 +114,7 @@ class _Fork(BaseRequestHandler):
             code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
         finally:
             # The server ends the fork without the rest of what Python does at its end.
-            threading._shutdown()
+            threading._shutdown()  # type: ignore[attr-defined]
             atexit._run_exitfuncs()
             sys.stdout.flush()
             sys.stderr.flush()
