@@ -22,7 +22,8 @@ _ROLLOUT = {*_ENVS, "er_gym", "er_gym.rollout"}
 _DATA = {*_ROLLOUT, "er_gym.data"}
 _AGENTS = {*_DATA, "agents"}
 _SCORING = {*_DATA, "benchmarks.scoring", "benchmarks.terminal"}
-_COMMAND = {*_AGENTS, *_SCORING, "benchmarks", "benchmarks.cli"}
+_MONITOR = {*_AGENTS, *_SCORING, "benchmarks", "benchmarks.vlm_run", "benchmarks.monitor"}
+_COMMAND = {*_MONITOR, "benchmarks.cli"}
 _SCRIPTS = {*_COMMAND, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "benchmarks.pages"}
 ALLOWED = {
     "er_gym.plugins": {"er_gym.plugins"},
@@ -40,6 +41,8 @@ ALLOWED = {
     "agents": _AGENTS,
     "benchmarks.scoring": _SCORING,
     "benchmarks.terminal": {*_ENVS, "benchmarks.terminal"},
+    "benchmarks.vlm_run": _AGENTS,
+    "benchmarks.monitor": _MONITOR,
     "benchmarks.cli": _COMMAND,
     "benchmarks": _COMMAND,
     # Scripts that measure or check look at the engine itself.

@@ -13,7 +13,8 @@ from benchmarks.cli.data_frames import frames
 from benchmarks.cli.data_import import import_
 from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
-from benchmarks.cli.options import Place, force_option
+from benchmarks.cli.options import EXISTING_FILE, Place, force_option
+from benchmarks.cli.suites import suite_given
 from benchmarks.terminal import echo, stdout, terminal
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def stats(collection: Path, layout: str, plots: Path | None, force: bool) -> Non
 @click.option("--limit", type=click.IntRange(min=1), help="Verify only the first N trajectories.")
 @click.option(
     "--tasks-file",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=EXISTING_FILE,
     help="The task file that was played, if it is no bundled suite.",
 )
 @click.option("--suite", help="The suite that was played, if it is package.module:Name.")
@@ -166,7 +167,7 @@ def verify(
 )
 @click.option(
     "--font",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=EXISTING_FILE,
     help="A TrueType or OpenType font for --out.",
 )
 @force_option
@@ -242,21 +243,17 @@ def _tasks(
     """The tasks of the suite that was played. No module is imported that only the collection names,
     which may be a stranger's."""
     from er_gym.data.sharegpt_import import SOURCE
-    from er_gym.tasks.suites import load_suite, suite_from_file, suite_registry
+    from er_gym.tasks.suites import load_suite, suite_registry
 
     told = collection.manifest
     doing(f"reading the tasks of {tasks_file or suite_name or told.suite}")
-    if tasks_file is not None and suite_name is not None:
-        raise BadInput("give --suite or --tasks-file, not both")
     if SOURCE in told.settings:
         raise BadInput(
             f"{collection.path} was imported from a file that does not tell poses and seeds, so "
             "that its trajectories cannot be replayed; stats, show and export work on it"
         )
-    if tasks_file is not None:
-        suite = suite_from_file(tasks_file)
-    elif suite_name is not None:
-        suite = load_suite(suite_name)
+    if tasks_file is not None or suite_name is not None:
+        suite = suite_given(suite_name, tasks_file)
     elif told.suite in suite_registry().names():
         suite = load_suite(told.suite)
     else:

@@ -81,7 +81,7 @@ def export(
     The output holds a README.md that says how the library loads it. docs/data-formats.md compares
     the formats.
     """
-    from benchmarks.cli.progress import bar
+    from benchmarks.cli.progress import counting
     from er_gym.data.collection import Collection
     from er_gym.data.exports import EXPORTS, ExportOptions
     from er_gym.data.exports import export as write
@@ -99,12 +99,7 @@ def export(
             tasks_file=tasks_file,
         )
         collection = Collection.open(directory)
-        with bar(terminal(stderr=True)) as shown:
-            task = shown.add_task(name, total=None, status="")
-
-            def progress(done: int, total: int) -> None:
-                shown.update(task, completed=done, total=total)
-
+        with counting(terminal(stderr=True), name) as progress:
             summary = write(collection, format, out, options, progress)
     for line in _lines(summary, out):
         echo(line)

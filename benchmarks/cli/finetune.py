@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
+from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, needing, print_problem
 from benchmarks.cli.options import Place, Words, overrides_option
 from benchmarks.terminal import echo
 
@@ -93,13 +93,8 @@ def finetune(
     if gpus is not None or copy:
         raise BadInput("--gpus and --copy are for --print; leave them out")
     begin_import("PyTorch, transformers and peft", "torch", "transformers", "peft")
-    try:
+    with needing("fine-tuning", "er-gym[finetune]"):
         from agents.finetune import train as training
-    except ImportError as error:
-        raise BadInput(
-            f"{error.name or error} is not installed, and fine-tuning needs it: "
-            "pip install 'er-gym[finetune]'"
-        ) from error
     try:
         with bad_input():
             result = training.train(

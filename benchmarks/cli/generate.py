@@ -197,24 +197,21 @@ def _build(
     order: _Order, parts: Path, options: ExecutorOptions, console: Console
 ) -> tuple[BuildResult, int]:
     """Build the tasks and show progress; returns the chosen ones, and how many were verified."""
-    from benchmarks.cli.progress import bar
+    from benchmarks.cli.progress import LiveProgress
     from benchmarks.cli.suite_builder import build_suite
 
     rooms = len(order.spec.rooms)
     verified = done = 0
-    with (
-        options.workforce(lambda line: console.print(line, style="dim"), processors()) as workforce,
-        bar(console) as progress,
-    ):
-        shown = progress.add_task("generating tasks", total=rooms, status="")
+    shown = LiveProgress(console, "generating tasks", rooms)
 
-        def on_room(scene: str, made: BuildResult) -> None:
-            nonlocal verified, done
-            verified, done = verified + len(made.tasks), done + 1
-            progress.update(shown, advance=1, status=f"{verified} verified, last {scene}")
-            if not console.is_terminal and done * 10 // rooms > (done - 1) * 10 // rooms:
-                console.print(f"{done}/{rooms} rooms, {verified} tasks verified")
+    def on_room(scene: str, made: BuildResult) -> None:
+        nonlocal verified, done
+        verified, done = verified + len(made.tasks), done + 1
+        shown.update(completed=done, status=f"{verified} verified, last {scene}")
+        if shown.is_line_due(done):
+            shown.print_line(f"{done}/{rooms} rooms, {verified} tasks verified")
 
+    with options.workforce(shown.say, processors()) as workforce, shown:
         made = build_suite(
             order.spec,
             order.seed,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from benchmarks.cli.errors import BadInput, bad_input
+from benchmarks.cli.errors import bad_input, needing
 from benchmarks.cli.options import MOST_SEED, Place, overrides_option
 from benchmarks.terminal import echo
 
@@ -62,13 +62,8 @@ def new_model(
         made = load_architecture(architecture, overrides)
         texts = _texts(collections, dialect)
     begin_import("PyTorch and transformers", "torch", "transformers")
-    try:
+    with needing("a new model", "er-gym[local]"):
         from agents.finetune.new_model import make_model
-    except ImportError as error:
-        raise BadInput(
-            f"{error.name or error} is not installed, and a new model needs it: "
-            "pip install 'er-gym[local]'"
-        ) from error
     with bad_input():
         make_model(made, texts, out, seed)
     size = sum(file.stat().st_size for file in out.glob("*.safetensors"))

@@ -1,15 +1,69 @@
-"""Options that several commands have."""
+"""Options that several commands have, and groups that a command takes as one argument."""
 
 from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
 import click
 
 from benchmarks.cli.errors import BadInput
+
+
+@dataclass(frozen=True)
+class OptionGroup:
+    """Options of a command, a field each; a subclass makes its fields with :func:`option`."""
+
+    @property
+    def given(self) -> list[str]:
+        """The options that the command line gives, as they are written there."""
+        return [
+            each.metadata["flag"]
+            for each in fields(self)
+            if _is_given(getattr(self, each.name)) and "flag" in each.metadata
+        ]
+
+
+def _is_given(value: object) -> bool:
+    return value is not None and value is not False and value != ()
+
+
+def option(*names: str, **settings: Any) -> Any:
+    """A field of a group that an option fills, with the arguments of :func:`click.option`."""
+    return shared(click.option(*names, **settings))
+
+
+def shared(add: Any) -> Any:
+    """A field of a group that an option fills which other commands have, too."""
+    (made,) = add(lambda: None).__click_params__
+    empty: Any = () if made.multiple else False if made.is_flag else None
+    return field(default=empty, metadata={"add": add, "flag": made.opts[0]})
+
+
+def with_options(**groups: type[OptionGroup]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add the options of groups to a command, which gets each group as an argument of its name."""
+
+    def add(command: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(command)
+        def with_groups(**given: Any) -> Any:
+            for name, group in groups.items():
+                values = {each.name: given.pop(each.name, each.default) for each in fields(group)}
+                given[name] = group(**values)
+            return command(**given)
+
+        for group in reversed(groups.values()):
+            for each in reversed(fields(group)):
+                if "add" in each.metadata:
+                    each.metadata["add"](with_groups)
+        return with_groups
+
+    return add
+
 
 SCORER_CHOICES = ("both", "paper", "corrected")
 """As in ``benchmarks.scoring.report``, which is too slow to import for ``--help``; a test
@@ -84,13 +138,11 @@ workers_option = click.option(
 )
 
 
-def size_options(command: Any) -> Any:
-    """``--width`` and ``--height``, of pictures; None for the suite's own."""
-    for name in ("--height", "--width"):
-        command = click.option(
-            name, type=click.IntRange(16, 4096), help="Of pictures, pixels.  [default: the suite's]"
-        )(command)
-    return command
+def size_option(name: str) -> Any:
+    """``--width`` or ``--height``, of pictures; None for the suite's own."""
+    return click.option(
+        name, type=click.IntRange(16, 4096), help="Of pictures, pixels.  [default: the suite's]"
+    )
 
 
 def given_size(width: int | None, height: int | None) -> dict[str, int]:

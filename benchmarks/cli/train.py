@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
+from benchmarks.cli.errors import INTERRUPTED, bad_input, needing, print_problem
 from benchmarks.cli.options import MOST_SEED, Place, overrides_option
 from benchmarks.terminal import echo
 
@@ -56,13 +56,8 @@ def train_rl(
         wanted = load_config(file, (*overrides, *chosen), more)
     run = out or Path("runs") / "rl" / f"{file.stem}-{wanted.seed}"
     begin_import("PyTorch and Stable-Baselines3", "torch", "stable_baselines3", "sb3_contrib")
-    try:
+    with needing("training", "er-gym[rl]"):
         from agents.rl import train as training
-    except ImportError as error:
-        raise BadInput(
-            f"{error.name or error} is not installed, and training needs it: "
-            "pip install 'er-gym[rl]'"
-        ) from error
     try:
         with bad_input():
             model = training.train(wanted, run, show_progress=True)

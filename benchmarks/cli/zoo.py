@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from benchmarks.cli.errors import BadInput, bad_input
+from benchmarks.cli.errors import BadInput, bad_input, needing
 from benchmarks.cli.options import Place, Words
 from benchmarks.terminal import echo, stdout
 
@@ -123,13 +123,8 @@ def add(
             f"{name!r:.80} is no name for a model; give lower-case letters and digits, such as "
             "single-search"
         )
-    try:
+    with needing("packing a model", "er-gym[rl,local]"):
         from agents.zoo import packing
-    except ImportError as error:
-        raise BadInput(
-            f"{error.name or error} is not installed, and packing a model needs it: "
-            "pip install 'er-gym[rl]' for a policy, 'er-gym[local]' for a language model"
-        ) from error
     from agents.zoo.card import Card, card_text
     from agents.zoo.index import CARD, FOLDER
     from benchmarks.cli.zoo_figures import RUN, figure_of, take_over_settings

@@ -22,11 +22,10 @@ from typing import Any
 
 import click
 
-from benchmarks.cli.executor import Workforce
-from benchmarks.cli.vlm_options import VLMOptions
-from benchmarks.cli.vlm_run import VLMRun
+from benchmarks.vlm_run import VLMRun
 from er_gym import __version__
 from er_gym.rollout.events import EpisodeEnded, Event
+from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.machines import THIS_MACHINE
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.tasks import Task, load_suite
@@ -141,12 +140,12 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
     )
     process.start()
     theirs.close()
-    options = VLMOptions(
+    vlm_run = VLMRun.of(
+        "openai:answering-server",
         base_url=(ours.recv(),),
         overrides=[f"pictures.width={size}", f"pictures.height={size}"],
         concurrency=concurrency,
     )
-    vlm_run = VLMRun.of("openai:answering-server", options)
     env = {**suite.env, **vlm_run.env}
     ended: list[tuple[float, int]] = []
     with tempfile.TemporaryDirectory() as place:
@@ -163,7 +162,7 @@ def main(episodes: int, concurrency: int, workers: int, latency: float, size: in
 
         with closing(vlm_run.factory(run_directory.path)) as factory:
             outcome = vlm_run.play(
-                factory, run_directory, tasks, Workforce(THIS_MACHINE, workers), [note]
+                factory, run_directory, tasks, Parallelism(workers, machines=THIS_MACHINE), [note]
             )
     ours.close()
     process.join(5)

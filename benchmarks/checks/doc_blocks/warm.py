@@ -27,7 +27,7 @@ _SOCKET = "DOC_BLOCKS_SOCKET"
 _LONGEST = 1 << 17
 _IMPORTED = (
     "benchmarks.cli.main",
-    "benchmarks.cli.vlm_run",
+    "benchmarks.vlm_run",
     "benchmarks.scoring.report",
     "benchmarks.scoring.tables",
     "er_gym.envs.embodied_env",
