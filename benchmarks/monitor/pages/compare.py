@@ -11,7 +11,7 @@ from benchmarks.monitor.episode_view import EpisodeView, view_of
 from benchmarks.monitor.failures import FAILURES
 from benchmarks.monitor.listing import page_number, page_of
 from benchmarks.monitor.places import Place
-from benchmarks.monitor.site import NothingThere, Routes, Site
+from benchmarks.monitor.site import NothingThere, Routes, Site, or_nothing
 from er_gym.rollout.run_directory import RunDirectory
 
 MOST_RUNS = 12
@@ -94,11 +94,9 @@ class ComparePages:
         if len(asked) != 2:
             raise NothingThere
         places = [self._site.place(id, "run") for id in asked]
-        try:
+        with or_nothing():
             runs = [RunDirectory.open(place.path) for place in places]
             views = [view_of(run, key) for run in runs]
-        except (ValueError, OSError):
-            raise NothingThere from None
         parts_at = _parts_at(*views)
         told = {
             "key": key,

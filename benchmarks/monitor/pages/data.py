@@ -10,7 +10,6 @@ from fastapi import Request, Response
 from benchmarks.monitor.collection_index import Collections
 from benchmarks.monitor.data_view import (
     DataFilter,
-    chosen,
     outcome_of,
     overview,
     record_of,
@@ -22,7 +21,7 @@ from benchmarks.monitor.listing import neighbours, page_of
 from benchmarks.monitor.pages.replays import ReplayPages
 from benchmarks.monitor.places import Place
 from benchmarks.monitor.run_view import RunSummary
-from benchmarks.monitor.site import NothingThere, Routes, Site
+from benchmarks.monitor.site import NothingThere, Routes, Site, or_nothing
 from benchmarks.monitor.world import CannotReplay
 from er_gym.data.collection import PARTS, Collection, CollectionManifest
 from er_gym.data.line_index import trajectory_at
@@ -80,7 +79,7 @@ class DataPages(ReplayPages):
         place = self._site.place(id, "collection")
         filter = DataFilter.of(request.query_params)
         with self._collections.use(place) as index:
-            taken = chosen(index, filter)
+            taken = filter.chosen(index.heads)
             told = overview(index, self._site.translator(request))
             told |= {"total": len(index.heads), "found": index.found, "damaged": index.damaged}
             told["unknown"] = filter.unknown_type(index.found.task_types)
@@ -101,7 +100,7 @@ class DataPages(ReplayPages):
         filter = DataFilter.of(request.query_params)
         trajectory = self._trajectory(place, key)
         with self._collections.use(place) as index:
-            ids = [head.id for head in chosen(index, filter)]
+            ids = [head.id for head in filter.chosen(index.heads)]
         before, after = neighbours(ids, key)
         turns, pictures = turns_of(trajectory)
         told = {
@@ -128,10 +127,8 @@ class DataPages(ReplayPages):
             head = index.at(key)
         if head is None:
             raise NothingThere
-        try:
+        with or_nothing():
             return trajectory_at(Collection.open(place.path), head.offset)
-        except (ValueError, OSError):
-            raise NothingThere from None
 
     def _played(self, id: str, key: str) -> tuple[Manifest, EpisodeRecord]:
         place = self._site.place(id, "collection")

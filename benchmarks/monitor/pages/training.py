@@ -11,8 +11,8 @@ from benchmarks.monitor.places import Place
 from benchmarks.monitor.run_view import RunSummary, Tally
 from benchmarks.monitor.site import NothingThere, Routes, Site
 from benchmarks.monitor.training_view import (
-    Curves,
     Trained,
+    curves,
     finetuning_charts,
     policy_charts,
     trained,
@@ -28,7 +28,7 @@ class TrainingPages:
 
     def __init__(self, site: Site) -> None:
         self._site = site
-        self._curves = Curves()
+        self._curves = curves()
 
     def routes(self) -> Routes:
         """The pages by address."""
