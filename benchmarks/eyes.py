@@ -29,7 +29,7 @@ from agents.vlm.pictures import noise_like
 from agents.vlm.settings import AgentSettings
 from agents.vlm.tuned_model import agent_file
 from benchmarks.cli.errors import bad_input
-from benchmarks.cli.options import Place
+from benchmarks.cli.options import EXISTING_FOLDER
 from benchmarks.scoring.tables import Table, as_markdown, print_tables
 from benchmarks.terminal import stdout
 from er_gym.data.dialects import load_dialect
@@ -207,8 +207,8 @@ def _share(answers: Sequence[Answers], measure: str) -> str:
 
 
 @click.command()
-@click.argument("model", type=Place(exists=True, file_okay=False, path_type=Path))
-@click.argument("frames", type=Place(exists=True, file_okay=False, path_type=Path))
+@click.argument("model", type=EXISTING_FOLDER)
+@click.argument("frames", type=EXISTING_FOLDER)
 @click.option("--limit", type=click.IntRange(min=1), help="Only the first N frames.")
 @click.option("--batch", type=click.IntRange(min=1), default=32, show_default=True)
 @click.option("--md", is_flag=True, help="Print Markdown.")

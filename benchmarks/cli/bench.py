@@ -23,9 +23,9 @@ from benchmarks.cli.errors import (
 from benchmarks.cli.executor import ExecutorOptions, Workforce, with_executor_options
 from benchmarks.cli.options import (
     EXISTING_FILE,
+    FOLDER,
     MOST_SAMPLES,
     OptionGroup,
-    Place,
     Words,
     faults_option,
     named,
@@ -59,66 +59,50 @@ TRACKERS = ("tensorboard", "trackio")
 class BenchOptions(OptionGroup):
     """What is played, by whom, by which rules, and where the run is written."""
 
-    suite: str | None = option("--suite", help="A bundled suite; `er-gym suites` lists them.")
-    tasks_file: Path | None = option(
-        "--tasks-file", type=EXISTING_FILE, help="A task file in the paper's format."
-    )
+    suite: str | None = option(help="A bundled suite; `er-gym suites` lists them.")
+    tasks_file: Path | None = option(type=EXISTING_FILE, help="A task file in the paper's format.")
     poses: Path | None = option(
-        "--poses", type=EXISTING_FILE, help="A file of exact object poses in the paper's format."
+        type=EXISTING_FILE, help="A file of exact object poses in the paper's format."
     )
     agent: str = option(
-        "--agent",
         type=Words(),
         required=True,
         help="The agent: oracle, random, searcher, zoo:NAME, rl:RUN, openai:MODEL, "
         "package.module:Class …",
     )
-    out: Path | None = option(
-        "--out",
-        type=Place(file_okay=False, path_type=Path),
-        help="The run directory.  [default: runs/SUITE-AGENT]",
-    )
+    out: Path | None = option(type=FOLDER, help="The run directory.  [default: runs/SUITE-AGENT]")
     limit: int | None = option(
-        "--limit", type=click.IntRange(min=1), help="Play no more than the first N tasks."
+        type=click.IntRange(min=1), help="Play no more than the first N tasks."
     )
     spread: bool = option(
-        "--spread",
         is_flag=True,
         help="With --limit and --skip: take a fixed random sample, not the first tasks.",
     )
     skip: int = option(
-        "--skip",
         type=click.IntRange(min=0),
         default=0,
         metavar="N",
         help="Leave out the N tasks that --limit N plays.",
     )
     samples: int = option(
-        "--samples",
         type=click.IntRange(1, MOST_SAMPLES),
         default=1,
         show_default=True,
         help="How often each task is played, each time with another seed.",
     )
     task_ids: tuple[str, ...] = option(
-        "--task-ids", multiple=True, metavar="ID,…", help="Play these tasks; may be repeated."
+        multiple=True, metavar="ID,…", help="Play these tasks; may be repeated."
     )
-    types: str | None = option("--types", metavar="TYPE,…", help="Play only tasks of these types.")
-    shard: str | None = option(
-        "--shard", metavar="I/N", help="Play the I-th of N parts, such as 2/8."
-    )
+    types: str | None = option(metavar="TYPE,…", help="Play only tasks of these types.")
+    shard: str | None = option(metavar="I/N", help="Play the I-th of N parts, such as 2/8.")
     track: tuple[str, ...] = option(
-        "--track",
         multiple=True,
         type=click.Choice(TRACKERS),
         help="Log the run's figures for this program too; may be repeated.",
     )
     seed: int = shared(seed_option)
-    backend: str | None = option(
-        "--backend", help="The engine: embedded or unity.  [default: the suite's]"
-    )
+    backend: str | None = option(help="The engine: embedded or unity.  [default: the suite's]")
     instances: str | None = option(
-        "--instances",
         help="Which object a type name means: target or explore.  [default: the suite's]",
     )
     protocol: str = shared(protocol_option)

@@ -25,8 +25,9 @@ from benchmarks.cli.errors import (
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
 from benchmarks.cli.options import (
     EXISTING_FILE,
+    EXISTING_FOLDER,
+    FOLDER,
     OptionGroup,
-    Place,
     Words,
     given_size,
     named,
@@ -59,44 +60,28 @@ LANGUAGES = ("en", "zh")
 class CollectOptions(OptionGroup):
     """What is collected, how it is recorded, and where."""
 
-    suite: str | None = option(
-        "--suite", help="Take the tasks of a suite; `er-gym suites` lists them."
-    )
-    tasks_file: Path | None = option(
-        "--tasks-file", type=EXISTING_FILE, help="Take the tasks of a file."
-    )
-    out: Path = option(
-        "--out",
-        type=Place(file_okay=False, path_type=Path),
-        required=True,
-        help="The directory of the collection.",
-    )
+    suite: str | None = option(help="Take the tasks of a suite; `er-gym suites` lists them.")
+    tasks_file: Path | None = option(type=EXISTING_FILE, help="Take the tasks of a file.")
+    out: Path = option(type=FOLDER, required=True, help="The directory of the collection.")
     limit: int | None = option(
-        "--limit",
-        type=click.IntRange(min=1),
-        help="How many trajectories.  [default: the recipe's]",
+        type=click.IntRange(min=1), help="How many trajectories.  [default: the recipe's]"
     )
     recipe: str | None = option(
-        "--recipe",
         metavar="NAME",
         help="What is collected: a YAML file, or the name of one of er-gym's own.  "
         "[default: paper]",
     )
-    parts: str | None = option(
-        "--parts", metavar="PART,…", help="Collect only these parts of the recipe."
-    )
+    parts: str | None = option(metavar="PART,…", help="Collect only these parts of the recipe.")
     kinds: str | None = option(
-        "--kinds", metavar="a,b,c", help="Only these kinds of the expert's trajectories."
+        metavar="a,b,c", help="Only these kinds of the expert's trajectories."
     )
-    types: str | None = option("--types", metavar="TYPE,…", help="Only tasks of these types.")
-    scenes: str | None = option("--scenes", metavar="SCENE,…", help="Only tasks in these scenes.")
+    types: str | None = option(metavar="TYPE,…", help="Only tasks of these types.")
+    scenes: str | None = option(metavar="SCENE,…", help="Only tasks in these scenes.")
     instances: str | None = option(
-        "--instances",
         type=click.Choice(("target", "explore")),
         help="Which object a type name means.  [default: the suite's]",
     )
     writer: str = option(
-        "--writer",
         type=Words(),
         default="grounded",
         show_default=True,
@@ -104,7 +89,6 @@ class CollectOptions(OptionGroup):
         "--expert.",
     )
     thoughts: str = option(
-        "--thoughts",
         default="transitions",
         show_default=True,
         metavar="NAME",
@@ -112,42 +96,35 @@ class CollectOptions(OptionGroup):
         "own.",
     )
     language: Language = option(
-        "--language",
         type=click.Choice(LANGUAGES),
         default="en",
         show_default=True,
         help="The language of the thoughts.",
     )
     no_pictures: bool = option(
-        "--no-pictures",
         is_flag=True,
         help="Record what is seen in words alone, for models that read: many times as fast.",
     )
     width: int | None = shared(size_option("--width"))
     height: int | None = shared(size_option("--height"))
     correct: Path | None = option(
-        "--correct",
-        type=click.Path(exists=True, file_okay=False, path_type=Path),
+        type=EXISTING_FOLDER,
         metavar="RUN",
         help="Correct the failed episodes of a run of er-gym bench; give no --recipe.",
     )
     correct_after: CorrectAfter | None = option(
-        "--correct-after",
         type=click.Choice(("wrong", "failure", "anywhere")),
         help="With --correct: the expert takes over after the first action that did no key action; "
         "after the first that failed since the last key action, or anywhere: after up to six "
         "actions drawn at random, first among the refused ones.  [default: wrong, as in the paper]",
     )
     correct_by: CorrectBy | None = option(
-        "--correct-by",
         type=click.Choice(("expert", "searcher")),
         help="With --correct: who takes over. The searcher knows no more than the failed agent "
         "did.  [default: expert]",
     )
     allow_empty: bool = option(
-        "--allow-empty",
-        is_flag=True,
-        help="With --select and --correct: end well also if no episode can be taken.",
+        is_flag=True, help="With --select and --correct: end well also if no episode can be taken."
     )
 
 

@@ -29,31 +29,26 @@ class ExpertOptions(OptionGroup):
     """The options of a model that writes thoughts, names places, or decides."""
 
     expert: str | None = option(
-        "--expert",
         type=Words(),
         metavar="CLIENT:MODEL",
         help="A model that writes the thoughts: openai:MODEL, hf:PATH. The options from "
         "--agent-config on are for it.",
     )
     places: str | None = option(
-        "--places",
         type=click.Choice(["likely", "model"]),
         help="Who names the wrong places of a search: the likelihoods or the model.  "
         "[default: likely]",
     )
     decisions: str | None = option(
-        "--decisions",
         type=click.Choice(["plan", "model"]),
         help="Who decides the actions: the expert's plan, or the model, of which what succeeds is "
         "kept.  [default: plan]",
     )
     hint: str | None = option(
-        "--hint",
         type=click.Choice(["none", "plan"]),
         help="What a model that decides is told beside the task.  [default: none]",
     )
     strict_thoughts: bool = option(
-        "--strict-thoughts",
         is_flag=True,
         help="Of a model that decides, and with --select, take only what the critic finds no fault "
         "in.",

@@ -14,7 +14,7 @@ import click
 
 from benchmarks.cli.collect_choice import source_of
 from benchmarks.cli.errors import BadInput
-from benchmarks.cli.options import OptionGroup, Place, option
+from benchmarks.cli.options import EXISTING_FOLDER, OptionGroup, option
 
 if TYPE_CHECKING:
     from agents.expert.collect import Stratum
@@ -59,41 +59,33 @@ class SelectOptions(OptionGroup):
     """The options as they were given; None or False where they were not."""
 
     select: tuple[Path, ...] = option(
-        "--select",
-        type=Place(exists=True, file_okay=False, path_type=Path),
+        type=EXISTING_FOLDER,
         multiple=True,
         metavar="RUN",
         help="Take the successful episodes of a run of er-gym bench; may be repeated. The options "
         "from here to --rewrite-thoughts are for it.",
     )
     most_actions: int | None = option(
-        "--most-actions",
         type=click.IntRange(min=1),
         help=f"Take no longer episodes.  [default: {_DEFAULT_MOST_ACTIONS}]",
     )
     most_tokens: int | None = option(
-        "--most-tokens",
-        type=click.IntRange(min=1),
-        help="Take no longer conversations, in the model's own tokens.",
+        type=click.IntRange(min=1), help="Take no longer conversations, in the model's own tokens."
     )
     per_task: int | None = option(
-        "--per-task", type=click.IntRange(min=1), help="Take at most so many episodes of a task."
+        type=click.IntRange(min=1), help="Take at most so many episodes of a task."
     )
     balance: float | Literal["recipe", "none"] | None = option(
-        "--balance",
         type=Balance(),
         help="Take at most so many times as many of a task type as of the rarest; or recipe: in "
         f"the proportions of --recipe; or none.  [default: {_DEFAULT_BALANCE}]",
     )
     keep_failed: bool = option(
-        "--keep-failed",
         is_flag=True,
         help="Also take episodes in which actions failed; failed turns are not learnt from.",
     )
     rewrite_thoughts: bool = option(
-        "--rewrite-thoughts",
-        is_flag=True,
-        help="Have --writer write the thoughts, also where the model left its own.",
+        is_flag=True, help="Have --writer write the thoughts, also where the model left its own."
     )
 
 

@@ -13,7 +13,7 @@ from benchmarks.cli.data_frames import frames
 from benchmarks.cli.data_import import import_
 from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
-from benchmarks.cli.options import EXISTING_FILE, Place, force_option
+from benchmarks.cli.options import EXISTING_FILE, FILE, FOLDER, force_option
 from benchmarks.cli.suites import suite_given
 from benchmarks.terminal import echo, stdout, terminal
 
@@ -29,8 +29,7 @@ _MOST_LINES = 20
 """How many differences are printed."""
 _CLOSE = 3
 """How many ids like a mistyped one are named."""
-_directory = Place(file_okay=False, path_type=Path)
-_collection = click.argument("collection", metavar="DIR", type=_directory)
+_collection = click.argument("collection", metavar="DIR", type=FOLDER)
 
 
 @click.group()
@@ -46,7 +45,7 @@ data.add_command(import_)
 @data.command()
 @_collection
 @click.option("--format", "layout", type=click.Choice(FORMATS), default="table", show_default=True)
-@click.option("--plots", type=_directory, help="Draw the charts into this folder, as PNG.")
+@click.option("--plots", type=FOLDER, help="Draw the charts into this folder, as PNG.")
 @force_option
 def stats(collection: Path, layout: str, plots: Path | None, force: bool) -> None:
     """Count trajectories, thoughts and transitions, beside the paper's figures."""
@@ -160,16 +159,8 @@ def verify(
 @click.option(
     "--trajectory", "trajectory_id", metavar="ID", help="Which to show.  [default: list the ids]"
 )
-@click.option(
-    "--out",
-    type=Place(dir_okay=False, path_type=Path),
-    help="Draw pictures and thoughts into this file, PNG or JPEG.",
-)
-@click.option(
-    "--font",
-    type=EXISTING_FILE,
-    help="A TrueType or OpenType font for --out.",
-)
+@click.option("--out", type=FILE, help="Draw pictures and thoughts into this file, PNG or JPEG.")
+@click.option("--font", type=EXISTING_FILE, help="A TrueType or OpenType font for --out.")
 @force_option
 def show(
     collection: Path, trajectory_id: str | None, out: Path | None, font: Path | None, force: bool

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import Place, split
+from benchmarks.cli.options import EXISTING_FILE, FOLDER, PATH, split
 from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ LANGUAGES = ("en", "zh")
 
 
 @click.command()
-@click.argument("directory", metavar="DIR", type=Place(path_type=Path))
+@click.argument("directory", metavar="DIR", type=PATH)
 @click.option(
     "--to",
     "format",
@@ -28,12 +28,7 @@ LANGUAGES = ("en", "zh")
     help="sharegpt (LLaMA-Factory), ms-swift, trl, trl-turns, verl, hf, minari, paper, or "
     "package.module:NAME.",
 )
-@click.option(
-    "--out",
-    required=True,
-    type=Place(file_okay=False, path_type=Path),
-    help="The output folder; new, or empty.",
-)
+@click.option("--out", required=True, type=FOLDER, help="The output folder; new, or empty.")
 @click.option(
     "--dialect",
     default="tags",
@@ -62,7 +57,7 @@ LANGUAGES = ("en", "zh")
 )
 @click.option(
     "--tasks-file",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=EXISTING_FILE,
     help="With minari: the task file that was played, if it is no bundled suite.",
 )
 def export(

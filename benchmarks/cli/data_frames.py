@@ -9,7 +9,7 @@ import click
 
 from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
-from benchmarks.cli.options import Place, given_size, seed_option, size_option, workers_option
+from benchmarks.cli.options import FOLDER, given_size, seed_option, size_option, workers_option
 from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
@@ -32,9 +32,7 @@ _QUALITY = 80
 @click.option("--scenes", metavar="SCENE,…", help="Only these rooms of the suite.")
 @size_option("--width")
 @size_option("--height")
-@click.option(
-    "--out", required=True, type=Place(file_okay=False, path_type=Path), help="The directory."
-)
+@click.option("--out", required=True, type=FOLDER, help="The directory.")
 @workers_option
 @seed_option
 def frames(

@@ -8,21 +8,16 @@ import click
 
 from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import bad_input, print_problem
-from benchmarks.cli.options import Place
+from benchmarks.cli.options import FOLDER, PATH
 from benchmarks.terminal import echo, terminal
 
 
 @click.command(name="import")
-@click.argument("file", metavar="FILE", type=Place(path_type=Path))
-@click.option(
-    "--out",
-    required=True,
-    type=Place(file_okay=False, path_type=Path),
-    help="The collection; new, or empty.",
-)
+@click.argument("file", metavar="FILE", type=PATH)
+@click.option("--out", required=True, type=FOLDER, help="The collection; new, or empty.")
 @click.option(
     "--pictures",
-    type=Place(file_okay=False, path_type=Path),
+    type=FOLDER,
     help="What the paths of pictures are relative to.  [default: the file's folder]",
 )
 @click.option(

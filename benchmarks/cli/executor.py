@@ -12,14 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli.errors import BadInput, bad_input, entered
-from benchmarks.cli.options import (
-    Finite,
-    OptionGroup,
-    Words,
-    option,
-    with_options,
-    workers_type,
-)
+from benchmarks.cli.options import Finite, OptionGroup, Words, option, with_options, workers_type
 
 if TYPE_CHECKING:
     from er_gym.rollout.executor import Parallelism
@@ -66,29 +59,23 @@ class ExecutorOptions(OptionGroup):
 
     workers: int | None = None
     executor: str | None = option(
-        "--executor",
         type=click.Choice(EXECUTORS),
         help="Where the workers are: processes of this machine, or a Ray cluster.  "
         "[default: local]",
     )
     ray_address: str | None = option(
-        "--ray-address",
         type=Words(),
         metavar="ADDRESS",
         help="The cluster: auto, HOST:PORT or ray://HOST:PORT.  [default: start Ray here]",
     )
     shared_dir: bool = option(
-        "--shared-dir",
         is_flag=True,
         help="Every node of the cluster sees this machine's files under the same paths.",
     )
     worker_cpus: float | None = option(
-        "--worker-cpus",
-        type=Finite(min=0),
-        help="The processors that a worker asks the cluster for.  [default: 1]",
+        type=Finite(min=0), help="The processors that a worker asks the cluster for.  [default: 1]"
     )
     worker_memory: float | None = option(
-        "--worker-memory",
         type=Finite(min=0.0625),
         metavar="GIB",
         help="The memory that a worker asks the cluster for; one that takes more is replaced.  "

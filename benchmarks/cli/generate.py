@@ -13,7 +13,7 @@ import click
 from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
-from benchmarks.cli.options import MOST_SEED, Span, force_option, split
+from benchmarks.cli.options import FILE, MOST_SEED, Span, force_option, split
 from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ _DEFAULT_TOTAL = 100
 @click.option("--suite", help="Generate this suite as its configuration says.")
 @click.option(
     "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FILE,
     help="The task file, .jsonl or .jsonl.gz.  [default: where er-gym looks for the suite]",
 )
 @click.option(

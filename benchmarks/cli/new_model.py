@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from benchmarks.cli.errors import bad_input, needing
-from benchmarks.cli.options import MOST_SEED, Place, overrides_option
+from benchmarks.cli.options import FOLDER, MOST_SEED, overrides_option
 from benchmarks.terminal import echo
 
 
@@ -19,14 +19,11 @@ from benchmarks.terminal import echo
     "collections",
     multiple=True,
     required=True,
-    type=Place(file_okay=False, path_type=Path),
+    type=FOLDER,
     help="A collection, or frames, from which the tokenizer learns; may be repeated.",
 )
 @click.option(
-    "--dialect",
-    default="paper",
-    show_default=True,
-    help="How its trajectories are put into words.",
+    "--dialect", default="paper", show_default=True, help="How its trajectories are put into words."
 )
 @overrides_option("vocabulary=2048")
 @click.option(
@@ -36,12 +33,7 @@ from benchmarks.terminal import echo
     show_default=True,
     help="Of the weights.",
 )
-@click.option(
-    "--out",
-    required=True,
-    type=Place(file_okay=False, path_type=Path),
-    help="The directory of the model.",
-)
+@click.option("--out", required=True, type=FOLDER, help="The directory of the model.")
 def new_model(
     architecture: str,
     collections: tuple[Path, ...],

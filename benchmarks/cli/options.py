@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import Field, dataclass, field, fields
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -23,9 +23,9 @@ class OptionGroup:
     def given(self) -> list[str]:
         """The options that the command line gives, as they are written there."""
         return [
-            each.metadata["flag"]
+            _added(each)[0]
             for each in fields(self)
-            if _is_given(getattr(self, each.name)) and "flag" in each.metadata
+            if each.metadata and _is_given(getattr(self, each.name))
         ]
 
 
@@ -33,16 +33,29 @@ def _is_given(value: object) -> bool:
     return value is not None and value is not False and value != ()
 
 
-def option(*names: str, **settings: Any) -> Any:
-    """A field of a group that an option fills, with the arguments of :func:`click.option`."""
-    return shared(click.option(*names, **settings))
+def option(flag: str = "", **settings: Any) -> Any:
+    """A field of a group that an option fills.
+
+    Args:
+        flag: the option, where that is not the field's name: ``--max-usd`` for ``max_usd``.
+        settings: those of :func:`click.option`.
+    """
+    empty: Any = () if settings.get("multiple") else False if settings.get("is_flag") else None
+    return field(default=empty, metadata={"flag": flag, "settings": settings})
 
 
 def shared(add: Any) -> Any:
     """A field of a group that an option fills which other commands have, too."""
     (made,) = add(lambda: None).__click_params__
-    empty: Any = () if made.multiple else False if made.is_flag else None
-    return field(default=empty, metadata={"add": add, "flag": made.opts[0]})
+    return field(default=() if made.multiple else None, metadata={"add": add, "flag": made.opts[0]})
+
+
+def _added(each: Field[Any]) -> tuple[str, Any]:
+    """A field's option as it is written, and what adds it to a command."""
+    flag = each.metadata.get("flag") or f"--{each.name.replace('_', '-')}"
+    if "settings" in each.metadata:
+        return flag, click.option(flag, each.name, **each.metadata["settings"])
+    return flag, each.metadata.get("add", lambda command: command)
 
 
 def with_options(**groups: type[OptionGroup]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -58,8 +71,7 @@ def with_options(**groups: type[OptionGroup]) -> Callable[[Callable[..., Any]], 
 
         for group in reversed(groups.values()):
             for each in reversed(fields(group)):
-                if "add" in each.metadata:
-                    each.metadata["add"](with_groups)
+                _added(each)[1](with_groups)
         return with_groups
 
     return add
@@ -151,6 +163,17 @@ def given_size(width: int | None, height: int | None) -> dict[str, int]:
     return {name: pixels for name, pixels in size.items() if pixels is not None}
 
 
+def port_option(default: int) -> Any:
+    """``--port``, of a server."""
+    return click.option(
+        "--port",
+        type=click.IntRange(0, 65535),
+        default=default,
+        show_default=True,
+        help="The port; 0 for a free one.",
+    )
+
+
 force_option = click.option(
     "--force", is_flag=True, help="Also replace files that er-gym did not write."
 )
@@ -207,7 +230,11 @@ class Words(click.ParamType):
         return str(value)
 
 
+PATH = Place(path_type=Path)
+FILE = Place(dir_okay=False, path_type=Path)
+FOLDER = Place(file_okay=False, path_type=Path)
 EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+EXISTING_FOLDER = Place(exists=True, file_okay=False, path_type=Path)
 
 
 class Finite(click.FloatRange):

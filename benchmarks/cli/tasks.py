@@ -12,7 +12,7 @@ from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import BadInput, bad_input, report_set_aside
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
 from benchmarks.cli.generate import generate
-from benchmarks.cli.options import Place, force_option, split
+from benchmarks.cli.options import FOLDER, PATH, force_option, split
 from benchmarks.cli.suites import fitted_tasks, refuse_if_none
 from benchmarks.terminal import echo, terminal
 
@@ -38,7 +38,7 @@ def verify(suites: tuple[str, ...], executor_options: ExecutorOptions) -> int:
     scene. The solver knows the key actions; it must succeed from the task's own start, within the
     step limit, and earn the whole reward.
     """
-    from contextlib import ExitStack, closing
+    from contextlib import closing
     from operator import attrgetter
 
     from benchmarks.cli.progress import Progress
@@ -57,13 +57,16 @@ def verify(suites: tuple[str, ...], executor_options: ExecutorOptions) -> int:
             echo(f"{suite.name}: set aside: {one}")
         solved = 0
         progress = Progress(console, suite.name, len(todo))
-        with ExitStack() as stack:
-            workforce = stack.enter_context(executor_options.workforce(progress.say, processors()))
-            stack.enter_context(progress)
-            results = workforce.machines.run_jobs(
-                make_verifier, todo, workers=workforce.workers, room=attrgetter("scene")
-            )
-            for task, verdict in stack.enter_context(closing(results)):
+        with (
+            executor_options.workforce(progress.say, processors()) as workforce,
+            progress,
+            closing(
+                workforce.machines.run_jobs(
+                    make_verifier, todo, workers=workforce.workers, room=attrgetter("scene")
+                )
+            ) as results,
+        ):
+            for task, verdict in results:
                 problem, detail = "the engine died", ""
                 if not isinstance(verdict, LostJob):
                     problem, detail = verdict.problem, verdict.detail
@@ -135,11 +138,7 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
 
 @tasks.command()
 @click.argument("suite", metavar="SUITE|FILE")
-@click.option(
-    "--out",
-    type=Place(file_okay=False, path_type=Path),
-    help=("Draw the charts into this folder, as PNG."),
-)
+@click.option("--out", type=FOLDER, help=("Draw the charts into this folder, as PNG."))
 @force_option
 def stats(suite: str, out: Path | None, force: bool) -> None:
     """Count a suite's tasks by type, room, scene and split, and draw the distributions."""
@@ -159,7 +158,7 @@ def stats(suite: str, out: Path | None, force: bool) -> None:
 
 @tasks.command()
 @click.argument("suite", metavar="SUITE|FILE|FOLDER")
-@click.argument("out", metavar="FILE|FOLDER", type=Place(path_type=Path))
+@click.argument("out", metavar="FILE|FOLDER", type=PATH)
 @click.option(
     "--task-ids", multiple=True, metavar="ID,…", help="Convert these tasks; may be repeated."
 )

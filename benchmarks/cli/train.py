@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from benchmarks.cli.errors import INTERRUPTED, bad_input, needing, print_problem
-from benchmarks.cli.options import MOST_SEED, Place, overrides_option
+from benchmarks.cli.options import FOLDER, MOST_SEED, overrides_option
 from benchmarks.terminal import echo
 
 
@@ -29,11 +29,7 @@ from benchmarks.terminal import echo
     "[default: the configuration's]",
 )
 @click.option("--seed", type=click.IntRange(0, MOST_SEED), help="[default: the configuration's]")
-@click.option(
-    "--out",
-    type=Place(file_okay=False, path_type=Path),
-    help="The run directory.  [default: runs/rl/CONFIG-SEED]",
-)
+@click.option("--out", type=FOLDER, help="The run directory.  [default: runs/rl/CONFIG-SEED]")
 def train_rl(
     config: str,
     overrides: tuple[str, ...],

@@ -16,7 +16,7 @@ from types import FrameType
 import click
 
 from benchmarks.cli.errors import BadInput, needing
-from benchmarks.cli.options import Place, with_options
+from benchmarks.cli.options import EXISTING_FOLDER, FOLDER, port_option, with_options
 from benchmarks.cli.ui_export import FileOptions, write_files
 from benchmarks.cli.vlm_options import VLMOptions
 from benchmarks.terminal import echo
@@ -46,12 +46,7 @@ def _open_browser(address: str) -> None:
 
 
 @click.command(name="ui")
-@click.argument(
-    "folders",
-    nargs=-1,
-    type=Place(exists=True, file_okay=False, path_type=Path),
-    metavar="[FOLDER]...",
-)
+@click.argument("folders", nargs=-1, type=EXISTING_FOLDER, metavar="[FOLDER]...")
 @click.option(
     "--host",
     default=_LOOPBACK,
@@ -59,18 +54,12 @@ def _open_browser(address: str) -> None:
     help="The address to listen on. Any other than this machine's own needs a token, which is "
     "printed.",
 )
-@click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=8010,
-    show_default=True,
-    help="The port; 0 for a free one.",
-)
+@port_option(8010)
 @click.option("--token", help="The token for another --host.  [default: a random one]")
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
 @click.option(
     "--play",
-    type=Place(file_okay=False, path_type=Path),
+    type=FOLDER,
     metavar="OUT",
     help="Let a person play, alone or in place of an agent; the runs are written below OUT.",
 )

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 
 from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import OptionGroup, Place, option
+from benchmarks.cli.options import EXISTING_FOLDER, PATH, OptionGroup, option
 from benchmarks.terminal import echo, terminal
-
-_FOLDER = Place(exists=True, file_okay=False, path_type=Path)
 
 
 @dataclass(frozen=True)
@@ -22,51 +20,41 @@ class FileOptions(OptionGroup):
     """The options of ``er-gym ui`` for files."""
 
     export: Path | None = option(
-        "--export",
-        type=_FOLDER,
+        type=EXISTING_FOLDER,
         metavar="RUN",
         help="Show nothing; write a run's pages to --out: one file with everything in it where the "
         "name ends in .html, else a folder.",
     )
     episodes: int | None = option(
-        "--episodes",
         type=click.IntRange(0),
         help="With --export: the most episodes that can be replayed.  [default: 20 in a file, "
         "all in a folder]",
     )
     only: tuple[str, ...] = option(
-        "--only",
         multiple=True,
         metavar="NAME=VALUE",
         help="With --export: which episodes can be replayed, as the page filters and sorts them, "
         "such as outcome=failure, type=single_search, type=Search, steps=5-10 or sort=-steps.",
     )
     draw: bool = option(
-        "--draw",
         is_flag=True,
         help="With --export: draw what the agent could see where it was shown no pictures.",
     )
     video: Path | None = option(
-        "--video",
-        type=_FOLDER,
+        type=EXISTING_FOLDER,
         metavar="RUN",
         help="Show nothing; write an episode of a run to --out as a video: .webp, or .mp4 with "
         "imageio-ffmpeg.",
     )
-    episode: str | None = option(
-        "--episode", metavar="KEY", help="With --video: which.  [default: the first]"
-    )
-    out: Path | None = option(
-        "--out", type=Place(path_type=Path), help="What --export or --video writes."
-    )
+    episode: str | None = option(metavar="KEY", help="With --video: which.  [default: the first]")
+    out: Path | None = option(type=PATH, help="What --export or --video writes.")
     language: str = option(
-        "--language",
         type=click.Choice(("en", "zh")),
         default="en",
         show_default=True,
         help="With --export: of the words.",
     )
-    overwrite: bool = option("--overwrite", is_flag=True, help="Replace what is at --out.")
+    overwrite: bool = option(is_flag=True, help="Replace what is at --out.")
 
 
 def write_files(options: FileOptions) -> bool:
@@ -114,7 +102,7 @@ def _filter(only: Sequence[str]) -> Any:
     """The filter that the options name."""
     from benchmarks.monitor.run_view import SORTS, Filter
 
-    names = [each.name for each in fields(Filter) if each.name != "page"]
+    names = [name for name in Filter.names() if name != "page"]
     given: dict[str, str] = {}
     for one in only:
         name, equal, value = one.partition("=")

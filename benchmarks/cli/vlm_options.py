@@ -34,7 +34,6 @@ class VLMOptions(OptionGroup):
     agent_config: str | None = shared(agent_config_option)
     overrides: Sequence[str] = shared(overrides_option("sampling.temperature=0.7"))
     base_url: Sequence[str] = option(
-        "--base-url",
         type=Words(),
         multiple=True,
         metavar="URL",
@@ -42,24 +41,18 @@ class VLMOptions(OptionGroup):
         "model: each request goes to the one with the fewest under way.",
     )
     prompts_from: Path | None = option(
-        "--prompts-from",
         type=EXISTING_FILE,
         metavar="DATASET",
         help="Take the prompts from a training file in the paper's format.",
     )
     concurrency: int | None = option(
-        "--concurrency",
-        type=click.IntRange(1, 1000),
-        help="The number of simultaneous conversations.  [default: 8]",
+        type=click.IntRange(1, 1000), help="The number of simultaneous conversations.  [default: 8]"
     )
     max_usd: float | None = option(
-        "--max-usd",
-        type=Finite(min=0, min_open=True),
-        help="Stop after spending this many US dollars.",
+        type=Finite(min=0, min_open=True), help="Stop after spending this many US dollars."
     )
-    max_tokens: int | None = option("--max-tokens", type=int, help="Stop after this many tokens.")
+    max_tokens: int | None = option(type=int, help="Stop after this many tokens.")
     max_minutes: float | None = option(
-        "--max-minutes",
         type=Finite(min=0, min_open=True),
         help="Stop after this many minutes, even within a request.",
     )
