@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from benchmarks.cli.activity import doing
 from benchmarks.cli.collect_expert import ExpertOptions, ExpertRun
+from benchmarks.cli.collect_options import CollectOptions, refuse_misfits
 from benchmarks.cli.collect_select import Selection, SelectOptions
 from benchmarks.cli.errors import (
     CRASHED,
@@ -24,17 +25,9 @@ from benchmarks.cli.errors import (
 )
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
 from benchmarks.cli.options import (
-    EXISTING_FILE,
-    EXISTING_FOLDER,
-    FOLDER,
-    OptionGroup,
-    Words,
     given_size,
     named,
-    option,
     seed_option,
-    shared,
-    size_option,
     with_options,
 )
 from benchmarks.cli.suites import chosen_tasks, fitted_tasks
@@ -42,90 +35,12 @@ from benchmarks.cli.vlm_options import VLMOptions
 from benchmarks.terminal import stdout, terminal
 
 if TYPE_CHECKING:
-    from agents.expert.collect import CollectSettings, CollectSummary, Stratum
-    from agents.expert.corrections import CorrectAfter, CorrectBy
+    from agents.expert.collect import CollectSummary
     from agents.expert.players import Players
     from agents.expert.recipe import Recipe
     from agents.expert.writers.registry import NamedWriter
     from er_gym.data.collection import Collection, CollectionManifest
-    from er_gym.data.trajectory import Language
     from er_gym.rollout.events import Cost
-    from er_gym.tasks.suites import Suite
-    from er_gym.tasks.task import Task
-
-LANGUAGES = ("en", "zh")
-
-
-@dataclass(frozen=True)
-class CollectOptions(OptionGroup):
-    """What is collected, how it is recorded, and where."""
-
-    suite: str | None = option(help="Take the tasks of a suite; `er-gym suites` lists them.")
-    tasks_file: Path | None = option(type=EXISTING_FILE, help="Take the tasks of a file.")
-    out: Path = option(type=FOLDER, required=True, help="The directory of the collection.")
-    limit: int | None = option(
-        type=click.IntRange(min=1), help="How many trajectories.  [default: the recipe's]"
-    )
-    recipe: str | None = option(
-        metavar="NAME",
-        help="What is collected: a YAML file, or the name of one of er-gym's own.  "
-        "[default: paper]",
-    )
-    parts: str | None = option(metavar="PART,…", help="Collect only these parts of the recipe.")
-    kinds: str | None = option(
-        metavar="a,b,c", help="Only these kinds of the expert's trajectories."
-    )
-    types: str | None = option(metavar="TYPE,…", help="Only tasks of these types.")
-    scenes: str | None = option(metavar="SCENE,…", help="Only tasks in these scenes.")
-    instances: str | None = option(
-        type=click.Choice(("target", "explore")),
-        help="Which object a type name means.  [default: the suite's]",
-    )
-    writer: str = option(
-        type=Words(),
-        default="grounded",
-        show_default=True,
-        help="Who writes the thoughts: grounded, or package.module:Class. For a model, give "
-        "--expert.",
-    )
-    thoughts: str = option(
-        default="transitions",
-        show_default=True,
-        metavar="NAME",
-        help="Which kinds of thoughts follow which: a YAML file, or the name of one of er-gym's "
-        "own.",
-    )
-    language: Language = option(
-        type=click.Choice(LANGUAGES),
-        default="en",
-        show_default=True,
-        help="The language of the thoughts.",
-    )
-    no_pictures: bool = option(
-        is_flag=True,
-        help="Record what is seen in words alone, for models that read: many times as fast.",
-    )
-    width: int | None = shared(size_option("--width"))
-    height: int | None = shared(size_option("--height"))
-    correct: Path | None = option(
-        type=EXISTING_FOLDER,
-        metavar="RUN",
-        help="Correct the failed episodes of a run of er-gym bench; give no --recipe.",
-    )
-    correct_after: CorrectAfter | None = option(
-        type=click.Choice(("wrong", "failure", "anywhere")),
-        help="With --correct: the expert takes over after the first action that did no key action; "
-        "after the first that failed since the last key action, or anywhere: after up to six "
-        "actions drawn at random, first among the refused ones.  [default: wrong, as in the paper]",
-    )
-    correct_by: CorrectBy | None = option(
-        type=click.Choice(("expert", "searcher")),
-        help="With --correct: who takes over. The searcher knows no more than the failed agent "
-        "did.  [default: expert]",
-    )
-    allow_empty: bool = option(
-        is_flag=True, help="With --select and --correct: end well also if no episode can be taken."
-    )
 
 
 @click.command(name="collect")
@@ -152,6 +67,7 @@ def collect(
     """
     from agents.expert.collect import Collector
     from benchmarks.cli.collect_choice import chosen_recipe, source_of
+    from benchmarks.cli.collect_plan import candidates, settings_of
     from benchmarks.cli.progress import CollectProgress
     from er_gym.data.collection import TRAJECTORIES, CollectionError
     from er_gym.locking import Locked
@@ -164,7 +80,7 @@ def collect(
     out = options.out
     with bad_input():
         doing("reading the recipe and the tasks")
-        _refuse_misfits(options, select_options, expert_options)
+        refuse_misfits(options, select_options, expert_options)
         selection = Selection.of(select_options, options.recipe, expert_options.strict_thoughts)
         if selection is not None:
             expert_options = replace(expert_options, strict_thoughts=False)
@@ -186,7 +102,7 @@ def collect(
             recipe = chosen_recipe(
                 options.recipe, named("--parts", options.parts), named("--kinds", options.kinds)
             )
-        settings, manifest = _settings(
+        settings, manifest = settings_of(
             suite, fitted.tasks, env, recipe, options, seed, model, selection
         )
         plays = selection is None and options.correct is None
@@ -197,7 +113,7 @@ def collect(
             )
             left_out: dict[str, int] = {}
         else:
-            strata, left_out = _strata(settings, options, model)
+            strata, left_out = candidates(settings, options, model)
         make_writer = _make_writer(options.writer)
     report_set_aside(suite.name, fitted.set_aside, fitted.substitutions)
     for reason, number in left_out.items():
@@ -271,138 +187,6 @@ def collect(
         )
         return CRASHED
     return 0 if summary.taken or options.allow_empty else CRASHED
-
-
-def _refuse_misfits(
-    options: CollectOptions, select_options: SelectOptions, expert_options: ExpertOptions
-) -> None:
-    """Refuse options that do not go together."""
-    given = [*options.given, *expert_options.given]
-
-    def refuse(flags: Sequence[str], why: str) -> None:
-        misfit = next((flag for flag in given if flag in flags), None)
-        if misfit is not None:
-            raise BadInput(f"{misfit} {why}")
-
-    expert = expert_options.expert
-    if expert is not None and options.no_pictures:
-        raise BadInput("--no-pictures is for scripted writers; leave it or --expert out")
-    if expert is not None and options.writer != "grounded":
-        raise BadInput(f"give --writer {options.writer} or --expert {expert}, not both")
-    if expert_options.decides and options.correct is not None:
-        raise BadInput("--correct follows a plan: leave out --decisions model")
-    if expert_options.decides and options.kinds is not None:
-        raise BadInput("--kinds is for --decisions plan: a model that decides plays one kind")
-    if select_options.select:
-        flags = ("--correct", "--parts", "--kinds", "--expert")
-        refuse(flags, "does not go with --select: leave one of them out")
-    if options.correct is None:
-        refuse(("--correct-after", "--correct-by"), "is for --correct RUN; leave it out")
-    else:
-        flags = ("--recipe", "--parts", "--kinds")
-        refuse(flags, "is for a recipe; --correct RUN collects without one")
-    if select_options.select or options.correct is not None:
-        refuse(("--instances",), "is that of the run; leave it out")
-
-
-def _name_of(run: Path) -> str:
-    """The name of a run directory with the digest of what it plays."""
-    from er_gym.rollout.run_directory import RunDirectory
-
-    return f"{run.resolve().name} ({RunDirectory.open(run).manifest.digest})"
-
-
-def _stated_corrections(options: CollectOptions) -> dict[str, str]:
-    """How it is corrected, for the manifest, which does not state the paper's way."""
-    stated = {"correct_after": options.correct_after, "correct_by": options.correct_by}
-    return {name: given for name, given in stated.items() if given not in (None, "wrong", "expert")}
-
-
-def _settings(
-    suite: Suite,
-    tasks: Sequence[Task],
-    env: Mapping[str, Any],
-    recipe: Recipe | None,
-    options: CollectOptions,
-    seed: int,
-    model: ExpertRun | None,
-    selection: Selection | None,
-) -> tuple[CollectSettings, CollectionManifest]:
-    """What decides the trajectories, and the manifest that states it."""
-    from agents.expert.collect import CollectSettings, corrections_recipe
-    from agents.expert.players import PlaySettings
-    from agents.expert.thought_kinds import load_thought_kinds
-    from agents.vlm.settings import Pictures
-    from er_gym import __version__
-    from er_gym.data.collection import CollectionManifest
-    from er_gym.envs.embodied_env import EmbodiedEnv
-
-    if model is not None:
-        env = {**env, **model.env}
-    EmbodiedEnv((), **env)  # so that bad arguments are found before any worker starts
-    kinds = load_thought_kinds(options.thoughts)
-    pictures = None
-    if not options.no_pictures:
-        pictures = Pictures(quality=80, min_pixels=1, max_pixels=2**24)
-    stated = corrections_recipe() if recipe is None else recipe
-    if model is not None and model.options.decides:
-        from agents.expert.decider import model_recipe
-
-        stated = model_recipe(stated)
-    manifest = CollectionManifest(
-        suite=suite.name,
-        suite_digest=suite.digest,
-        settings={
-            "recipe": stated.model_dump(mode="json", exclude={"description"}),
-            "tasks": sorted({task.type.name for task in suite.tasks}),
-            "scenes": sorted({task.scene for task in suite.tasks}),
-            "thoughts": kinds.model_dump(mode="json"),
-            "writer": options.writer,
-            "language": options.language,
-            "env": dict(env),
-            "pictures": pictures and pictures.model_dump(include={"format", "quality"}),
-            **({} if options.correct is None else {"corrects": _name_of(options.correct)}),
-            **({} if model is None else {"expert": model.stated}),
-            **({} if selection is None else selection.stated),
-            **_stated_corrections(options),
-        },
-        seed=seed,
-        er_gym=__version__,
-    )
-    settings = CollectSettings(
-        recipe=stated,
-        tasks=tasks,
-        env=env,
-        play=PlaySettings(kinds, pictures, options.language),
-        seed=seed,
-        manifest=manifest.model_dump(mode="json"),
-    )
-    return settings, manifest
-
-
-def _strata(
-    settings: CollectSettings, options: CollectOptions, model: ExpertRun | None
-) -> tuple[dict[tuple[str, str], Stratum], dict[str, int]]:
-    """The candidates, and how many failed episodes are left out, by the reason."""
-    from agents.expert.collect import correction_strata, recipe_strata
-    from er_gym.rollout.run_directory import RunDirectory
-
-    correct = options.correct
-    if correct is None:
-        wanted = recipe_strata(settings, options.limit)
-        if model is not None and model.options.decides:
-            from agents.expert.decider import ModelCandidates
-
-            for stratum in wanted.values():
-                stratum.sequence = ModelCandidates(stratum.sequence, model.run.name)
-        return wanted, {}
-    after, by = options.correct_after or "wrong", options.correct_by or "expert"
-    run = RunDirectory.open(correct)
-    strata, left_out = correction_strata(settings.tasks, run, options.limit, after, by)
-    if not (strata or options.allow_empty):
-        why = "; ".join(f"{number} x {reason}" for reason, number in left_out.items())
-        raise BadInput(f"{correct} has no episode that can be corrected ({why or 'it is empty'})")
-    return strata, left_out
 
 
 def _make_writer(name: str) -> NamedWriter:

@@ -8,14 +8,11 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import EXISTING_FILE, FOLDER, PATH, split
+from benchmarks.cli.options import EXISTING_FILE, FOLDER, LANGUAGES, PATH, split
 from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
     from er_gym.data.exports import ExportSummary
-
-LANGUAGES = ("en", "zh")
-"""As in ``er_gym.data.trajectory``, which is too slow to import for ``--help``; a test compares."""
 
 
 @click.command()

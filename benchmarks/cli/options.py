@@ -77,9 +77,11 @@ def with_options(**groups: type[OptionGroup]) -> Callable[[Callable[..., Any]], 
     return add
 
 
+LANGUAGES = ("en", "zh")
+"""As in ``er_gym.data.trajectory``, which is too slow to import for ``--help``; a test compares."""
+
 SCORER_CHOICES = ("both", "paper", "corrected")
-"""As in ``benchmarks.scoring.report``, which is too slow to import for ``--help``; a test
-compares."""
+"""As in ``benchmarks.scoring.report``, for the same reason."""
 
 scorer_option = click.option(
     "--scorer",

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import EXISTING_FOLDER, PATH, OptionGroup, option
+from benchmarks.cli.options import EXISTING_FOLDER, LANGUAGES, PATH, OptionGroup, option
 from benchmarks.terminal import echo, terminal
 
 
@@ -49,7 +49,7 @@ class FileOptions(OptionGroup):
     episode: str | None = option(metavar="KEY", help="With --video: which.  [default: the first]")
     out: Path | None = option(type=PATH, help="What --export or --video writes.")
     language: str = option(
-        type=click.Choice(("en", "zh")),
+        type=click.Choice(LANGUAGES),
         default="en",
         show_default=True,
         help="With --export: of the words.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 from urllib.parse import urlencode
 
 from er_gym.tasks.types import canonical_names
@@ -16,6 +16,8 @@ _MOST_PAGES = 10**6
 
 Row = TypeVar("Row")
 _Filter = TypeVar("_Filter", bound="AddressFilter[Any]")
+_Class: TypeAlias = type[_Filter]
+"""Under another name, since a filter has a field ``type``."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class AddressFilter(Generic[Row]):
         return sorted((each.name for each in fields(cls)), key=("text", "sort", "page").count)
 
     @classmethod
-    def of(cls: type[_Filter], parameters: Mapping[str, str]) -> _Filter:
+    def of(cls: _Class[_Filter], parameters: Mapping[str, str]) -> _Filter:
         """From an address; what makes no sense there is passed over."""
         texts = {each.name: parameters.get(each.name, "") for each in fields(cls)}
         if texts["sort"].removeprefix("-") not in cls.sorts:
