@@ -125,13 +125,14 @@ def add(
     with needing("packing a model", "er-gym[rl,local]"):
         from agents.zoo import packing
     from agents.zoo.card import Card, card_text
-    from agents.zoo.index import CARD, FOLDER
+    from agents.zoo.index import CARD
+    from agents.zoo.index import FOLDER as MODELS
     from benchmarks.cli.zoo_figures import RUN, figure_of, take_over_settings
     from benchmarks.scoring.report import load_run
     from er_gym import __version__
     from er_gym.writing import write_atomic
 
-    models = into or FOLDER
+    models = into or MODELS
     with bad_input():
         reports = [load_run(path) for path in runs]
         figures = [figure_of(report, name, run) for report in reports]
