@@ -203,7 +203,7 @@ def bench(options: BenchOptions, executor_options: ExecutorOptions, vlm_options:
         raise BadInput(f"{error}; {_left_in(out, chosen, samples)}") from error
     except (KeyboardInterrupt, CannotGoOn) as error:
         why, code = exit_code_of(error)
-        print_problem(f"{why}: {_left_in(out, chosen, samples, told='same command' in why)}")
+        print_problem(f"{why}: {_left_in(out, chosen, samples, says_how='same command' in why)}")
         _print_causes(out)
         return code
     doing("computing the table")
@@ -220,15 +220,15 @@ def bench(options: BenchOptions, executor_options: ExecutorOptions, vlm_options:
     return 0
 
 
-def _left_in(out: Path, chosen: Sequence[Task], samples: int, *, told: bool = False) -> str:
-    """Say what a run that ended early has left, and how to go on, unless that was ``told``."""
+def _left_in(out: Path, chosen: Sequence[Task], samples: int, *, says_how: bool = False) -> str:
+    """Say what a run that ended early has left and how to go on, unless its reason ``says_how``."""
     from er_gym.rollout.run_directory import MANIFEST, RunDirectory
     from er_gym.rollout.runner import finished
 
     if not (out / MANIFEST).exists():
         return f"no episode was played, and nothing is left in {out}"
     done = len(finished(RunDirectory.open(out), chosen, samples))
-    again = "" if told else "; the same command continues"
+    again = "" if says_how else "; the same command continues"
     return f"{done} of {samples * len(chosen)} episodes are in {out}{again}"
 
 

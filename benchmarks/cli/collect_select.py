@@ -188,9 +188,9 @@ class Selection:
             from agents.expert.selection import explored_shares
 
             shares = {"shares": explored_shares(self.recipe)}
-        told = [f"{run.path.name} ({run.manifest.digest})" for run in self.runs]
+        names = [f"{run.path.name} ({run.manifest.digest})" for run in self.runs]
         own = {"strict_thoughts": self.strict, "rewrite_thoughts": self.options.rewrite_thoughts}
-        return {"selects": {"runs": told, **rules, **shares, **own}}
+        return {"selects": {"runs": names, **rules, **shares, **own}}
 
     def strata(
         self, tasks: Sequence[Task], limit: int | None, seed: int, allow_empty: bool

@@ -211,7 +211,7 @@ class Progress(LiveProgress):
             return "starting"
         played = self._done - self._before
         speed = played / max(time.monotonic() - self._start, 1e-9)
-        told = f"{100 * self._outcomes.rate:.1f} % success"
+        results = f"{100 * self._outcomes.rate:.1f} % success"
         if self._none_played:
-            told = f"{self._done:,} crashed"
-        return ", ".join(filter(None, (told, f"{speed:.1f} episodes/s", self._cost)))
+            results = f"{self._done:,} crashed"
+        return ", ".join(filter(None, (results, f"{speed:.1f} episodes/s", self._cost)))

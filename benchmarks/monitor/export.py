@@ -39,7 +39,7 @@ from benchmarks.monitor.event_tail import EpisodeRow
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.listing import Page
 from benchmarks.monitor.pages.replays import PICTURE_KINDS, drawn_room, no_room
-from benchmarks.monitor.pages.runs import run_told
+from benchmarks.monitor.pages.runs import run_variables
 from benchmarks.monitor.places import Places
 from benchmarks.monitor.run_view import SORTS, Filter
 from benchmarks.monitor.site import Site
@@ -116,9 +116,9 @@ class Exported:
 
     def row(self, row: EpisodeRow) -> str:
         """What the script needs to filter and to sort a row, as JSON."""
-        told = {name: _sortable(key(row)) for name, key in SORTS.items()}
+        values = {name: _sortable(key(row)) for name, key in SORTS.items()}
         text = f"{row.key} {row.instruction}".casefold()[:_MOST_TEXT]
-        return json.dumps({**told, "scene": row.scene, "text": text})
+        return json.dumps({**values, "scene": row.scene, "text": text})
 
 
 def export(wanted: Wanted, tell: Callable[[int, int], None] = lambda done, of: None) -> Exported:
@@ -190,14 +190,14 @@ class _Maker:
         """The run's page with all rows."""
         with self._site.runs.use(self.place) as view:
             view.count_failures(float("inf"))
-            told = run_told(view, Filter())
+            variables = run_variables(view, Filter())
             every = view.chosen(Filter())
-            told["page"] = Page(every, len(every), 1, 1)
+            variables["page"] = Page(every, len(every), 1, 1)
 
         def replay(path: str, parameters: Mapping[str, str]) -> str | None:
             return self._episode_address(path, parameters, f"{EPISODES}/")
 
-        return self._page("run.html", {**told, "exported": self.exported}, "", replay)
+        return self._page("run.html", {**variables, "exported": self.exported}, "", replay)
 
     def episode_page(self, key: str, picture: Callable[[int, bytes, str], str]) -> OfflinePage:
         """An episode's page.
@@ -216,7 +216,7 @@ class _Maker:
         if not contents and self.wanted.draw:
             episode, contents = self._drawn(episode)
         addresses = [picture(n, *each) if each else None for n, each in enumerate(contents)]
-        told = {
+        variables = {
             "run": self._site.summary(self.place),
             "key": key,
             "episode": episode,
@@ -232,14 +232,16 @@ class _Maker:
                 return addresses[int(n)] if n.isdigit() and int(n) < len(addresses) else None
             return self._episode_address(path, parameters, "")
 
-        return self._page("episode.html", told, "../", shown)
+        return self._page("episode.html", variables, "../", shown)
 
-    def _page(self, template: str, told: Mapping[str, Any], up: str, other: Link) -> OfflinePage:
+    def _page(
+        self, template: str, variables: Mapping[str, Any], up: str, other: Link
+    ) -> OfflinePage:
         """A page of the server for a disk.
 
         Args:
             template: the page's.
-            told: its variables.
+            variables: its variables.
             up: from the page to the list's folder.
             other: where addresses lead beside those of the list.
         """
@@ -252,8 +254,8 @@ class _Maker:
             query = f"?{urlencode(parameters)}" if parameters or self.wanted.is_file else ""
             return query if self.wanted.is_file else f"{up}{INDEX}{query}"
 
-        told = {**told, "end_of_title": Markup(_END_OF_TITLE)}
-        title, _, body = self._site.page(template, told, self._words, link=link).partition(
+        variables = {**variables, "end_of_title": Markup(_END_OF_TITLE)}
+        title, _, body = self._site.page(template, variables, self._words, link=link).partition(
             _END_OF_TITLE
         )
         return OfflinePage(title.strip(), body)

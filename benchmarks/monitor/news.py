@@ -44,13 +44,13 @@ async def _events(
     data: Callable[[object], object],
 ) -> AsyncIterator[str]:
     yield "retry: 1000\n\n"
-    told, silent = await version(), 0.0
+    last, silent = await version(), 0.0
     while not (closing.is_set() or await request.is_disconnected()):
         await asyncio.sleep(look_seconds)
         now = await version()
         silent += look_seconds
-        if now != told:
-            told, silent = now, 0.0
+        if now != last:
+            last, silent = now, 0.0
             yield f"event: change\ndata: {data(now)}\n\n"
         elif silent >= _BEAT_SECONDS:
             silent = 0.0

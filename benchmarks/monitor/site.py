@@ -71,23 +71,23 @@ class Site:
         self._templates.filters.update(formats.FILTERS)
 
     def show(
-        self, request: Request, template: str, told: Mapping[str, Any], status: int = 200
+        self, request: Request, template: str, variables: Mapping[str, Any], status: int = 200
     ) -> Response:
         """A page in the reader's language.
 
         Args:
             request: asks for it.
             template: its file.
-            told: the template's variables; ``live`` is what the page wants news of.
+            variables: the template's variables; ``live`` is what the page wants news of.
             status: of the answer.
         """
         here = request.url.path + (f"?{request.url.query}" if request.url.query else "")
-        return HTMLResponse(self.page(template, told, self.translator(request), here), status)
+        return HTMLResponse(self.page(template, variables, self.translator(request), here), status)
 
     def page(
         self,
         template: str,
-        told: Mapping[str, Any],
+        variables: Mapping[str, Any],
         t: Translator,
         here: str = "",
         link: Callable[[str], str | None] = lambda address: address,
@@ -96,7 +96,7 @@ class Site:
 
         Args:
             template: its file.
-            told: the template's variables; ``exported`` if there will be no server.
+            variables: the template's variables; ``exported`` if there will be no server.
             t: the words.
             here: its address.
             link: from an address of the server to where it leads from this page; None for nowhere.
@@ -109,7 +109,7 @@ class Site:
 
         shared = {"live": "", "scripts": (), "at": "", "exported": None, "to": to}
         return self._templates.get_template(template).render(
-            {**shared, **told, "t": t, "here": here}
+            {**shared, **variables, "t": t, "here": here}
         )
 
     def translator(self, request: Request) -> Translator:

@@ -71,8 +71,8 @@ class DataPages(ReplayPages):
         """All collections."""
         rows = [self._row(place) for place in self._site.places.of_kind("collection")]
         rows.sort(key=lambda row: (row.state != "running", row.place.name))
-        told = {"rows": rows, "roots": self._site.places.roots, "live": "*", "at": "data"}
-        return self._site.show(request, "data.html", told)
+        variables = {"rows": rows, "roots": self._site.places.roots, "live": "*", "at": "data"}
+        return self._site.show(request, "data.html", variables)
 
     def collection(self, request: Request, id: str) -> Response:
         """A collection."""
@@ -80,10 +80,10 @@ class DataPages(ReplayPages):
         filter = DataFilter.of(request.query_params)
         with self._collections.use(place) as index:
             taken = filter.chosen(index.heads)
-            told = overview(index, self._site.translator(request))
-            told |= {"total": len(index.heads), "found": index.found, "damaged": index.damaged}
-            told["unknown"] = filter.unknown_type(index.found.task_types)
-        told |= {
+            variables = overview(index, self._site.translator(request))
+            variables |= {"total": len(index.heads), "found": index.found, "damaged": index.damaged}
+            variables["unknown"] = filter.unknown_type(index.found.task_types)
+        variables |= {
             "row": self._row(place),
             "filter": filter,
             "page": page_of(taken, filter.page),
@@ -92,7 +92,7 @@ class DataPages(ReplayPages):
             "live": id,
             "at": "data",
         }
-        return self._site.show(request, "collection.html", told)
+        return self._site.show(request, "collection.html", variables)
 
     def trajectory(self, request: Request, id: str, key: str = "") -> Response:
         """A trajectory, turn by turn."""
@@ -103,7 +103,7 @@ class DataPages(ReplayPages):
             ids = [head.id for head in filter.chosen(index.heads)]
         before, after = neighbours(ids, key)
         turns, pictures = turns_of(trajectory)
-        told = {
+        variables = {
             "place": place,
             "key": key,
             "trajectory": trajectory,
@@ -115,7 +115,7 @@ class DataPages(ReplayPages):
             "scripts": ("episode.js",),
             "at": "data",
         }
-        return self._site.show(request, "trajectory.html", told)
+        return self._site.show(request, "trajectory.html", variables)
 
     def _picture(self, id: str, key: str, n: int) -> Path | None:
         place = self._site.place(id, "collection")

@@ -44,7 +44,7 @@ class EpisodePages(ReplayPages):
         with self._site.runs.use(place) as view:
             before, after = neighbours([row.key for row in view.chosen(chosen)], key)
             summary = view.summary()
-        told = {
+        variables = {
             "run": summary,
             "key": key,
             "episode": episode,
@@ -53,7 +53,7 @@ class EpisodePages(ReplayPages):
             "after": after,
             "scripts": ("episode.js",),
         }
-        return self._site.show(request, "episode.html", told)
+        return self._site.show(request, "episode.html", variables)
 
     def _played(self, id: str, key: str) -> tuple[Manifest, EpisodeRecord]:
         record, manifest = self._site.record(id, key)

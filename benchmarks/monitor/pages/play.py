@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import HTMLResponse, PlainTextResponse, RedirectResponse
@@ -16,7 +16,7 @@ from agents.zoo.index import PREFIX, model_names
 from benchmarks.monitor.news import news
 from benchmarks.monitor.play.forms import BadForm, Forms
 from benchmarks.monitor.play.plan import plan, playable, run_path
-from benchmarks.monitor.play.session import Moment, Refused, Session
+from benchmarks.monitor.play.session import Moment, Order, Refused, Session
 from benchmarks.monitor.play.sessions import Sessions
 from benchmarks.monitor.site import NothingThere, Routes, Site
 from er_gym.envs.actions import parse
@@ -44,7 +44,7 @@ KEYS: Mapping[str, str] = {
 _PATIENCE_SECONDS = 25.0
 """How long an answer waits for what was asked for; the page then shows how far it is."""
 _LOOK_SECONDS = 0.15
-_ORDERS = frozenset({"step", "go", "next"})
+_ORDERS: frozenset[str] = frozenset(get_args(Order))
 _FIRST = "mini"
 
 
@@ -112,7 +112,7 @@ class PlayPages:
             about = found.description
         except ValueError as error:
             problem, status, about = problem or str(error), max(status, 400), ""
-        told = {
+        variables = {
             "on": True,
             "problem": problem,
             "secret": self._forms.secret,
@@ -127,7 +127,7 @@ class PlayPages:
             "sessions": self.sessions.open_now(),
             "folder": self._folder,
         }
-        return self._site.show(request, "play.html", told, status)
+        return self._site.show(request, "play.html", variables, status)
 
     async def begin(self, request: Request) -> Response:
         """Begin a session."""
@@ -173,7 +173,7 @@ class PlayPages:
         self, request: Request, session: Session, now: Moment, problem: str = "", status: int = 200
     ) -> Response:
         run = session.plan.path.resolve()
-        told = {
+        variables = {
             "session": session,
             "plan": session.plan,
             "now": now,
@@ -184,7 +184,7 @@ class PlayPages:
             "place": self._site.places.at(run, "run"),
             "scripts": ("play.js",),
         }
-        return self._site.show(request, "play_session.html", told, status)
+        return self._site.show(request, "play_session.html", variables, status)
 
     async def change(self, request: Request, id: str) -> Response:
         """Do what the person asks for, and show what came of it."""
