@@ -59,6 +59,7 @@ from agents.vlm.settings import AgentSettings
 from benchmarks.inspect_secrets import without_secrets
 from benchmarks.scoring.metrics import METRICS, score_episode
 from benchmarks.scoring.scorers import CORRECTED
+from benchmarks.vlm_run import env_of
 from er_gym.rollout.causes import CONTEXT, causes_in, count_causes
 from er_gym.rollout.env_pool import EnvPool
 from er_gym.rollout.play import episode_seed, play_episode
@@ -94,13 +95,7 @@ def er_gym(
     given = (overrides,) if isinstance(overrides, str) else tuple(overrides)
     settings = load_settings(agent_config, given)
     asked = load_suite(suite)
-    size = {"width": settings.pictures.width, "height": settings.pictures.height}
-    env = {
-        "backend": "embedded",
-        **asked.env,
-        **{name: value for name, value in size.items() if value is not None},
-        "obs_mode": settings.obs_mode,
-    }
+    env = {"backend": "embedded", **asked.env, **env_of(settings)}
     tasks = resolve_tasks(asked.tasks, env["backend"]).tasks
     chosen = {each.id: each for each in tasks[:limit]}
     return InspectTask(

@@ -22,7 +22,8 @@ _ROLLOUT = {*_ENVS, "er_gym", "er_gym.rollout"}
 _DATA = {*_ROLLOUT, "er_gym.data"}
 _AGENTS = {*_DATA, "agents"}
 _SCORING = {*_DATA, "benchmarks.scoring", "benchmarks.terminal"}
-_COMMAND = {*_AGENTS, *_SCORING, "benchmarks", "benchmarks.cli"}
+_MONITOR = {*_AGENTS, *_SCORING, "benchmarks", "benchmarks.vlm_run", "benchmarks.monitor"}
+_COMMAND = {*_MONITOR, "benchmarks.cli"}
 _HARNESS = {*_COMMAND, "benchmarks.harness"}
 _SCRIPTS = {*_HARNESS, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "benchmarks.pages"}
 ALLOWED = {
@@ -41,6 +42,8 @@ ALLOWED = {
     "agents": _AGENTS,
     "benchmarks.scoring": _SCORING,
     "benchmarks.terminal": {*_ENVS, "benchmarks.terminal"},
+    "benchmarks.vlm_run": _AGENTS,
+    "benchmarks.monitor": _MONITOR,
     "benchmarks.cli": _COMMAND,
     "benchmarks": _COMMAND,
     "benchmarks.harness": _HARNESS,

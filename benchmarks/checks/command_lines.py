@@ -29,7 +29,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
-import benchmarks.cli.vlm_run  # noqa: F401  # imported once, not in each fork
+import benchmarks.vlm_run  # noqa: F401  # imported once, not in each fork
 from benchmarks.checks.bad_commands import Line, lines
 from benchmarks.checks.bad_files import make
 from benchmarks.cli.main import main as er_gym

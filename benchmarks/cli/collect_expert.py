@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, field, replace
-from functools import reduce
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import Words
-from benchmarks.cli.vlm_options import VLMOptions, with_vlm_options
+from benchmarks.cli.options import OptionGroup, Words, option
+from benchmarks.cli.vlm_options import VLMOptions
 
 if TYPE_CHECKING:
     from agents.expert.players import Players
-    from benchmarks.cli.vlm_run import VLMRun
+    from benchmarks.vlm_run import VLMRun
     from er_gym.data.trajectory import Language
     from er_gym.rollout.events import Cost
 
@@ -26,68 +25,39 @@ _CONFIG = "expert"
 
 
 @dataclass(frozen=True)
-class ExpertOptions:
+class ExpertOptions(OptionGroup):
     """The options of a model that writes thoughts, names places, or decides."""
 
-    expert: str | None = None
-    places: str | None = None
-    decisions: str | None = None
-    hint: str | None = None
-    strict_thoughts: bool = False
-    vlm: VLMOptions = field(default_factory=VLMOptions)
+    expert: str | None = option(
+        type=Words(),
+        metavar="CLIENT:MODEL",
+        help="A model that writes the thoughts: openai:MODEL, hf:PATH. The options from "
+        "--agent-config on are for it.",
+    )
+    places: str | None = option(
+        type=click.Choice(["likely", "model"]),
+        help="Who names the wrong places of a search: the likelihoods or the model.  "
+        "[default: likely]",
+    )
+    decisions: str | None = option(
+        type=click.Choice(["plan", "model"]),
+        help="Who decides the actions: the expert's plan, or the model, of which what succeeds is "
+        "kept.  [default: plan]",
+    )
+    hint: str | None = option(
+        type=click.Choice(["none", "plan"]),
+        help="What a model that decides is told beside the task.  [default: none]",
+    )
+    strict_thoughts: bool = option(
+        is_flag=True,
+        help="Of a model that decides, and with --select, take only what the critic finds no fault "
+        "in.",
+    )
 
     @property
     def decides(self) -> bool:
         """Whether the model decides every action."""
         return self.decisions == "model"
-
-
-_OPTIONS = (
-    click.option(
-        "--expert",
-        type=Words(),
-        metavar="CLIENT:MODEL",
-        help="A model that writes the thoughts: openai:MODEL, hf:PATH. The options from "
-        "--agent-config on are for it.",
-    ),
-    click.option(
-        "--places",
-        type=click.Choice(["likely", "model"]),
-        help="Who names the wrong places of a search: the likelihoods or the model.  "
-        "[default: likely]",
-    ),
-    click.option(
-        "--decisions",
-        type=click.Choice(["plan", "model"]),
-        help="Who decides the actions: the expert's plan, or the model, of which what succeeds is "
-        "kept.  [default: plan]",
-    ),
-    click.option(
-        "--hint",
-        type=click.Choice(["none", "plan"]),
-        help="What a model that decides is told beside the task.  [default: none]",
-    ),
-    click.option(
-        "--strict-thoughts",
-        is_flag=True,
-        help="Of a model that decides, and with --select, take only what the critic finds no fault "
-        "in.",
-    ),
-)
-
-
-def with_expert_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add these options to a command, which gets them as one argument ``expert_options``."""
-
-    def with_options(vlm_options: VLMOptions, **given: Any) -> Any:
-        names = [name for name in ExpertOptions.__dataclass_fields__ if name != "vlm"]
-        options = ExpertOptions(**{name: given.pop(name) for name in names}, vlm=vlm_options)
-        return command(expert_options=options, **given)
-
-    with_options.__doc__ = command.__doc__
-    with_options.__name__ = command.__name__
-    added: Callable[..., Any] = with_vlm_options(with_options)
-    return reduce(lambda made, option: option(made), reversed(_OPTIONS), added)
 
 
 @dataclass(frozen=True)
@@ -105,7 +75,7 @@ class ExpertRun:
     language: Language
 
     @staticmethod
-    def of(options: ExpertOptions, language: Language) -> ExpertRun | None:
+    def of(options: ExpertOptions, vlm: VLMOptions, language: Language) -> ExpertRun | None:
         """From the options; None if no model takes part.
 
         Raises:
@@ -113,19 +83,17 @@ class ExpertRun:
             ValueError: a setting does not fit.
         """
         if options.expert is None:
-            _refuse_without_model(options)
+            _refuse_without_model(options, vlm)
             return None
         from agents.expert.writers.model import check_settings
         from agents.vlm.clients.budget import Ledger
         from agents.vlm.clients.registry import resolve_client
-        from benchmarks.cli.vlm_run import VLMRun
 
         kind, _ = resolve_client(options.expert)
-        _refuse_misfits(options, options.expert)
-        vlm = options.vlm
+        _refuse_misfits(options, vlm, options.expert)
         if not options.decides:
             vlm = replace(vlm, agent_config=vlm.agent_config or _CONFIG)
-        run = VLMRun.of(options.expert, vlm)
+        run = vlm.run(options.expert)
         prompts = run.settings.prompts.model_copy(update={"language": language})
         run = replace(run, settings=run.settings.model_copy(update={"prompts": prompts}))
         if not options.decides:
@@ -220,19 +188,18 @@ class ExpertRun:
         return Thinkers(lambda: writer)
 
 
-def _refuse_without_model(options: ExpertOptions) -> None:
+def _refuse_without_model(options: ExpertOptions, vlm: VLMOptions) -> None:
     given = [
         *(["--places model"] if options.places == "model" else ()),
         *(["--decisions model"] if options.decides else ()),
-        *(["--hint"] if options.hint else ()),
-        *(["--strict-thoughts"] if options.strict_thoughts else ()),
-        *options.vlm.given,
+        *(flag for flag in options.given if flag in ("--hint", "--strict-thoughts")),
+        *vlm.given,
     ]
     if given:
         raise BadInput(f"{given[0]} is for a model: give --expert, such as --expert openai:MODEL")
 
 
-def _refuse_misfits(options: ExpertOptions, name: str) -> None:
+def _refuse_misfits(options: ExpertOptions, vlm: VLMOptions, name: str) -> None:
     if options.decides:
         if options.places:
             raise BadInput("--places is for --decisions plan: a model that decides has no plan")
@@ -240,7 +207,7 @@ def _refuse_misfits(options: ExpertOptions, name: str) -> None:
     alone = [
         *([f"--hint {options.hint}"] if options.hint else ()),
         *(["--strict-thoughts"] if options.strict_thoughts else ()),
-        *(["--prompts-from"] if options.vlm.prompts_from else ()),
+        *(["--prompts-from"] if vlm.prompts_from else ()),
         *([f"--expert {name}"] if name.startswith("recorded:") else ()),
     ]
     if alone:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, reduce
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,7 +14,7 @@ import click
 
 from benchmarks.cli.collect_choice import source_of
 from benchmarks.cli.errors import BadInput
-from benchmarks.cli.options import Place
+from benchmarks.cli.options import EXISTING_FOLDER, OptionGroup, option
 
 if TYPE_CHECKING:
     from agents.expert.collect import Stratum
@@ -41,9 +42,9 @@ class Balance(click.ParamType):
 
     name = "FACTOR | recipe | none"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> float | Literal["recipe"] | None:
+    def convert(self, value: Any, param: Any, ctx: Any) -> float | str:
         if value in ("recipe", "none"):
-            return "recipe" if value == "recipe" else None
+            return str(value)
         try:
             factor = float(value)
         except ValueError:
@@ -53,81 +54,39 @@ class Balance(click.ParamType):
         return factor
 
 
-_OPTIONS: Mapping[str, Any] = {
-    "select": click.option(
-        "--select",
-        type=Place(exists=True, file_okay=False, path_type=Path),
+@dataclass(frozen=True)
+class SelectOptions(OptionGroup):
+    """The options as they were given; None or False where they were not."""
+
+    select: tuple[Path, ...] = option(
+        type=EXISTING_FOLDER,
         multiple=True,
         metavar="RUN",
         help="Take the successful episodes of a run of er-gym bench; may be repeated. The options "
         "from here to --rewrite-thoughts are for it.",
-    ),
-    "most_actions": click.option(
-        "--most-actions",
+    )
+    most_actions: int | None = option(
         type=click.IntRange(min=1),
         help=f"Take no longer episodes.  [default: {_DEFAULT_MOST_ACTIONS}]",
-    ),
-    "most_tokens": click.option(
-        "--most-tokens",
-        type=click.IntRange(min=1),
-        help="Take no longer conversations, in the model's own tokens.",
-    ),
-    "per_task": click.option(
-        "--per-task", type=click.IntRange(min=1), help="Take at most so many episodes of a task."
-    ),
-    "balance": click.option(
-        "--balance",
+    )
+    most_tokens: int | None = option(
+        type=click.IntRange(min=1), help="Take no longer conversations, in the model's own tokens."
+    )
+    per_task: int | None = option(
+        type=click.IntRange(min=1), help="Take at most so many episodes of a task."
+    )
+    balance: float | Literal["recipe", "none"] | None = option(
         type=Balance(),
         help="Take at most so many times as many of a task type as of the rarest; or recipe: in "
         f"the proportions of --recipe; or none.  [default: {_DEFAULT_BALANCE}]",
-    ),
-    "keep_failed": click.option(
-        "--keep-failed",
+    )
+    keep_failed: bool = option(
         is_flag=True,
         help="Also take episodes in which actions failed; failed turns are not learnt from.",
-    ),
-    "rewrite_thoughts": click.option(
-        "--rewrite-thoughts",
-        is_flag=True,
-        help="Have --writer write the thoughts, also where the model left its own.",
-    ),
-}
-
-
-@dataclass(frozen=True)
-class SelectOptions:
-    """The options as they were given; None or False where they were not."""
-
-    select: tuple[Path, ...] = ()
-    most_actions: int | None = None
-    most_tokens: int | None = None
-    per_task: int | None = None
-    balance: float | Literal["recipe"] | None = None
-    keep_failed: bool = False
-    rewrite_thoughts: bool = False
-    balance_given: bool = False
-
-    @property
-    def given(self) -> list[str]:
-        """The other options, if any was given, as they are written."""
-        names = [each.name for each in fields(self) if each.name not in ("select", "balance")]
-        names = [("balance" if n == "balance_given" else n) for n in names if getattr(self, n)]
-        return [f"--{name.replace('_', '-')}" for name in names]
-
-
-def with_select_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add these options to a command, which gets them as one argument ``select_options``."""
-
-    def with_options(**given: Any) -> Any:
-        own = {name: given.pop(name) for name in _OPTIONS}
-        source = click.get_current_context().get_parameter_source("balance")
-        said = source is not None and source.name != "DEFAULT"
-        return command(select_options=SelectOptions(**own, balance_given=said), **given)
-
-    with_options.__doc__ = command.__doc__
-    with_options.__name__ = command.__name__
-    with_options.__click_params__ = getattr(command, "__click_params__", [])  # type: ignore[attr-defined]
-    return reduce(lambda made, option: option(made), reversed([*_OPTIONS.values()]), with_options)
+    )
+    rewrite_thoughts: bool = option(
+        is_flag=True, help="Have --writer write the thoughts, also where the model left its own."
+    )
 
 
 @dataclass(frozen=True)
@@ -147,16 +106,13 @@ class Selection:
     strict: bool
 
     @staticmethod
-    def of(
-        options: SelectOptions, recipe_name: str | None, strict: bool, refused: Mapping[str, bool]
-    ) -> Selection | None:
+    def of(options: SelectOptions, recipe_name: str | None, strict: bool) -> Selection | None:
         """From the options; None if nothing is to be selected.
 
         Args:
             options: of the command line.
             recipe_name: ``--recipe``, for its proportions.
             strict: ``--strict-thoughts``.
-            refused: by name, whether an option was given that does not go with ``--select``.
 
         Raises:
             BadInput: options do not fit together.
@@ -166,9 +122,6 @@ class Selection:
             if options.given:
                 raise BadInput(f"{options.given[0]} is for --select RUN: give that, too")
             return None
-        misfit = next((name for name, given in refused.items() if given), "")
-        if misfit:
-            raise BadInput(f"{misfit} does not go with --select: leave one of them out")
         if recipe_name is not None and options.balance != "recipe":
             raise BadInput("--recipe is for --select with --balance recipe: give that, too")
         from agents.expert.recipe import DEFAULT, load_recipe
@@ -186,13 +139,14 @@ class Selection:
         """What is taken."""
         from agents.expert.selection import SelectionRules
 
-        own = self.options
-        rules = SelectionRules(
-            most_tokens=own.most_tokens, per_task=own.per_task, keep_failed=own.keep_failed
-        )
-        if own.most_actions is not None:
-            rules = replace(rules, most_actions=own.most_actions)
-        return replace(rules, balance=own.balance) if own.balance_given else rules
+        rules: dict[str, Any] = {
+            each.name: getattr(self.options, each.name)
+            for each in fields(SelectionRules)
+            if getattr(self.options, each.name) is not None
+        }
+        if rules.get("balance") == "none":
+            rules["balance"] = None
+        return SelectionRules(**rules)
 
     def source(self, name: str | None, tasks_file: Path | None) -> tuple[Suite, dict[str, Any]]:
         """The suite of the runs, and the environment in which they were played.
@@ -234,9 +188,9 @@ class Selection:
             from agents.expert.selection import explored_shares
 
             shares = {"shares": explored_shares(self.recipe)}
-        told = [f"{run.path.name} ({run.manifest.digest})" for run in self.runs]
+        names = [f"{run.path.name} ({run.manifest.digest})" for run in self.runs]
         own = {"strict_thoughts": self.strict, "rewrite_thoughts": self.options.rewrite_thoughts}
-        return {"selects": {"runs": told, **rules, **shares, **own}}
+        return {"selects": {"runs": names, **rules, **shares, **own}}
 
     def strata(
         self, tasks: Sequence[Task], limit: int | None, seed: int, allow_empty: bool
@@ -251,10 +205,7 @@ class Selection:
         screening = screen(self.runs, tasks, self.rules, seed)
         strata = selection_strata(screening, self.rules, self.recipe, limit)
         if not (allow_empty or any(stratum.quota for stratum in strata.values())):
-            reasons: dict[str, int] = {}
-            for row in screening.yields.values():
-                for reason, number in row.left_out.items():
-                    reasons[reason] = reasons.get(reason, 0) + number
+            reasons = sum((row.left_out for row in screening.yields.values()), Counter[str]())
             why = "; ".join(f"{number} x {reason}" for reason, number in sorted(reasons.items()))
             names = ", ".join(str(run.path) for run in self.runs)
             raise BadInput(f"{names}: no episode can be taken ({why or 'none of these tasks'})")

@@ -13,7 +13,8 @@ from benchmarks.cli.data_frames import frames
 from benchmarks.cli.data_import import import_
 from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
-from benchmarks.cli.options import Place, force_option
+from benchmarks.cli.options import EXISTING_FILE, FILE, FOLDER, force_option
+from benchmarks.cli.suites import suite_given
 from benchmarks.terminal import echo, stdout, terminal
 
 if TYPE_CHECKING:
@@ -28,8 +29,7 @@ _MOST_LINES = 20
 """How many differences are printed."""
 _CLOSE = 3
 """How many ids like a mistyped one are named."""
-_directory = Place(file_okay=False, path_type=Path)
-_collection = click.argument("collection", metavar="DIR", type=_directory)
+_collection = click.argument("collection", metavar="DIR", type=FOLDER)
 
 
 @click.group()
@@ -45,7 +45,7 @@ data.add_command(import_)
 @data.command()
 @_collection
 @click.option("--format", "layout", type=click.Choice(FORMATS), default="table", show_default=True)
-@click.option("--plots", type=_directory, help="Draw the charts into this folder, as PNG.")
+@click.option("--plots", type=FOLDER, help="Draw the charts into this folder, as PNG.")
 @force_option
 def stats(collection: Path, layout: str, plots: Path | None, force: bool) -> None:
     """Count trajectories, thoughts and transitions, beside the paper's figures."""
@@ -79,7 +79,7 @@ def stats(collection: Path, layout: str, plots: Path | None, force: bool) -> Non
 @click.option("--limit", type=click.IntRange(min=1), help="Verify only the first N trajectories.")
 @click.option(
     "--tasks-file",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=EXISTING_FILE,
     help="The task file that was played, if it is no bundled suite.",
 )
 @click.option("--suite", help="The suite that was played, if it is package.module:Name.")
@@ -159,16 +159,8 @@ def verify(
 @click.option(
     "--trajectory", "trajectory_id", metavar="ID", help="Which to show.  [default: list the ids]"
 )
-@click.option(
-    "--out",
-    type=Place(dir_okay=False, path_type=Path),
-    help="Draw pictures and thoughts into this file, PNG or JPEG.",
-)
-@click.option(
-    "--font",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="A TrueType or OpenType font for --out.",
-)
+@click.option("--out", type=FILE, help="Draw pictures and thoughts into this file, PNG or JPEG.")
+@click.option("--font", type=EXISTING_FILE, help="A TrueType or OpenType font for --out.")
 @force_option
 def show(
     collection: Path, trajectory_id: str | None, out: Path | None, font: Path | None, force: bool
@@ -242,21 +234,17 @@ def _tasks(
     """The tasks of the suite that was played. No module is imported that only the collection names,
     which may be a stranger's."""
     from er_gym.data.sharegpt_import import SOURCE
-    from er_gym.tasks.suites import load_suite, suite_from_file, suite_registry
+    from er_gym.tasks.suites import load_suite, suite_registry
 
     told = collection.manifest
     doing(f"reading the tasks of {tasks_file or suite_name or told.suite}")
-    if tasks_file is not None and suite_name is not None:
-        raise BadInput("give --suite or --tasks-file, not both")
     if SOURCE in told.settings:
         raise BadInput(
             f"{collection.path} was imported from a file that does not tell poses and seeds, so "
             "that its trajectories cannot be replayed; stats, show and export work on it"
         )
-    if tasks_file is not None:
-        suite = suite_from_file(tasks_file)
-    elif suite_name is not None:
-        suite = load_suite(suite_name)
+    if tasks_file is not None or suite_name is not None:
+        suite = suite_given(suite_name, tasks_file)
     elif told.suite in suite_registry().names():
         suite = load_suite(told.suite)
     else:

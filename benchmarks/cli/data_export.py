@@ -8,18 +8,15 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import Place, split
+from benchmarks.cli.options import EXISTING_FILE, FOLDER, LANGUAGES, PATH, split
 from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
     from er_gym.data.exports import ExportSummary
 
-LANGUAGES = ("en", "zh")
-"""As in ``er_gym.data.trajectory``, which is too slow to import for ``--help``; a test compares."""
-
 
 @click.command()
-@click.argument("directory", metavar="DIR", type=Place(path_type=Path))
+@click.argument("directory", metavar="DIR", type=PATH)
 @click.option(
     "--to",
     "format",
@@ -28,12 +25,7 @@ LANGUAGES = ("en", "zh")
     help="sharegpt (LLaMA-Factory), ms-swift, trl, trl-turns, verl, hf, minari, paper, or "
     "package.module:NAME.",
 )
-@click.option(
-    "--out",
-    required=True,
-    type=Place(file_okay=False, path_type=Path),
-    help="The output folder; new, or empty.",
-)
+@click.option("--out", required=True, type=FOLDER, help="The output folder; new, or empty.")
 @click.option(
     "--dialect",
     default="tags",
@@ -62,7 +54,7 @@ LANGUAGES = ("en", "zh")
 )
 @click.option(
     "--tasks-file",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=EXISTING_FILE,
     help="With minari: the task file that was played, if it is no bundled suite.",
 )
 def export(
@@ -81,7 +73,7 @@ def export(
     The output holds a README.md that says how the library loads it. docs/data-formats.md compares
     the formats.
     """
-    from benchmarks.cli.progress import bar
+    from benchmarks.cli.progress import counting
     from er_gym.data.collection import Collection
     from er_gym.data.exports import EXPORTS, ExportOptions
     from er_gym.data.exports import export as write
@@ -99,12 +91,7 @@ def export(
             tasks_file=tasks_file,
         )
         collection = Collection.open(directory)
-        with bar(terminal(stderr=True)) as shown:
-            task = shown.add_task(name, total=None, status="")
-
-            def progress(done: int, total: int) -> None:
-                shown.update(task, completed=done, total=total)
-
+        with counting(terminal(stderr=True), name) as progress:
             summary = write(collection, format, out, options, progress)
     for line in _lines(summary, out):
         echo(line)

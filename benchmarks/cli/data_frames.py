@@ -9,7 +9,7 @@ import click
 
 from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
-from benchmarks.cli.options import Place, given_size, seed_option, size_options, workers_option
+from benchmarks.cli.options import FOLDER, given_size, seed_option, size_option, workers_option
 from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
@@ -30,10 +30,9 @@ _QUALITY = 80
     help="How many; the same command with more goes on.",
 )
 @click.option("--scenes", metavar="SCENE,…", help="Only these rooms of the suite.")
-@size_options
-@click.option(
-    "--out", required=True, type=Place(file_okay=False, path_type=Path), help="The directory."
-)
+@size_option("--width")
+@size_option("--height")
+@click.option("--out", required=True, type=FOLDER, help="The directory.")
 @workers_option
 @seed_option
 def frames(
@@ -81,8 +80,8 @@ def _plan(
     name: str, scenes: str | None, width: int | None, height: int | None, out: Path, seed: int
 ) -> tuple[Camera, FramesManifest, list[Any]]:
     """How frames are drawn, the manifest that states it, and the rooms."""
-    from benchmarks.cli.collect_choice import chosen_tasks
     from benchmarks.cli.options import named
+    from benchmarks.cli.suites import chosen_tasks
     from er_gym import __version__
     from er_gym.data.frame_camera import Camera, rooms_of
     from er_gym.data.frames import FramesManifest
@@ -124,13 +123,12 @@ def _draw(drawing: Any, frame_set: Any, todo: list[Visit], out: Path) -> None:
     """Draw what is missing, and show how far it is."""
     from contextlib import closing
 
-    from benchmarks.cli.progress import bar
+    from benchmarks.cli.progress import LiveProgress
 
     there = sum(frame_set.has_visit(visit.number) for visit in todo)
     console = terminal(stderr=True)
     if there:
         console.print(f"{there} of {len(todo)} visits are there already", style="dim")
-    with bar(console) as shown, closing(drawing) as visits:
-        task = shown.add_task(str(out), total=len(todo), completed=there, status="visits")
+    with LiveProgress(console, str(out), len(todo), there) as shown, closing(drawing) as visits:
         for done, _ in enumerate(visits, there + 1):
-            shown.update(task, completed=done)
+            shown.update(completed=done, status="visits")

@@ -8,21 +8,16 @@ import click
 
 from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import bad_input, print_problem
-from benchmarks.cli.options import Place
+from benchmarks.cli.options import FOLDER, PATH
 from benchmarks.terminal import echo, terminal
 
 
 @click.command(name="import")
-@click.argument("file", metavar="FILE", type=Place(path_type=Path))
-@click.option(
-    "--out",
-    required=True,
-    type=Place(file_okay=False, path_type=Path),
-    help="The collection; new, or empty.",
-)
+@click.argument("file", metavar="FILE", type=PATH)
+@click.option("--out", required=True, type=FOLDER, help="The collection; new, or empty.")
 @click.option(
     "--pictures",
-    type=Place(file_okay=False, path_type=Path),
+    type=FOLDER,
     help="What the paths of pictures are relative to.  [default: the file's folder]",
 )
 @click.option(
@@ -45,7 +40,7 @@ def import_(
     from <DecisionMaking>. What the file does not tell, such as poses and key actions, stays empty:
     er-gym data stats, show and export work on the result, verify does not.
     """
-    from benchmarks.cli.progress import bar
+    from benchmarks.cli.progress import counting
     from er_gym.data.sharegpt_files import open_sharegpt
     from er_gym.data.sharegpt_import import LEFT_OUT, import_sharegpt
     from er_gym.writing import check_new_folder
@@ -64,12 +59,7 @@ def import_(
         first, *problems = opened.report.lines()
         for line in (*opened.places.lines(), *problems):
             print_problem(line)
-        with bar(terminal(stderr=True)) as shown:
-            task = shown.add_task("import", total=None, status="")
-
-            def progress(done: int, total: int) -> None:
-                shown.update(task, completed=done, total=total)
-
+        with counting(terminal(stderr=True), "import") as progress:
             summary = import_sharegpt(opened, out, copy=copy, progress=progress)
     echo(first)
     parts = ", ".join(f"{part} {count:,}" for part, count in summary.parts.items())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import Place, Words
+from benchmarks.cli.options import EXISTING_FOLDER, Words
 from benchmarks.terminal import echo
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ _WIDEST = 23
 )
 @click.option(
     "--shared-dir",
-    type=Place(exists=True, file_okay=False, path_type=Path),
+    type=EXISTING_FOLDER,
     metavar="DIR",
     help="With --ray: a directory that every node is to see under the same path.",
 )

@@ -5,13 +5,15 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, NoReturn
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, NoReturn, TypeVar
 
 import click
 
 from benchmarks.terminal import echo
 
+_Value = TypeVar("_Value")
 _LONGEST = 2_000  # characters of a line
 _MOST_LINES = 10  # about tasks of a suite
 
@@ -36,6 +38,44 @@ def bad_input(*more: type[Exception]) -> Iterator[None]:
         yield
     except known as error:
         raise BadInput(str(error)) from error
+
+
+@contextlib.contextmanager
+def entered(
+    make: Callable[[], AbstractContextManager[_Value]], *more: type[Exception]
+) -> Iterator[_Value]:
+    """What a context gives, for a ``with`` block; where it cannot be entered, that is bad input."""
+    with contextlib.ExitStack() as stack:
+        with bad_input(*more):
+            value = stack.enter_context(make())
+        yield value
+
+
+@contextlib.contextmanager
+def needing(what: str, install: str) -> Iterator[None]:
+    """Turn a package that the imports within lack into :class:`BadInput`.
+
+    Args:
+        what: needs the package; the subject of the sentence.
+        install: what brings all that it needs, such as ``er-gym[rl]``.
+    """
+    try:
+        yield
+    except ImportError as error:
+        from er_gym.extras import MissingPackage
+
+        raise BadInput(str(MissingPackage(what, error.name or str(error), install))) from error
+
+
+def exit_code_of(error: BaseException) -> tuple[str, int]:
+    """Why a command ended early, in words, and its exit code.
+
+    Args:
+        error: a KeyboardInterrupt, or a :class:`~er_gym.rollout.agent.CannotGoOn`.
+    """
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted", INTERRUPTED
+    return str(error), STOPPED
 
 
 @contextlib.contextmanager

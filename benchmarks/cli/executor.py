@@ -6,16 +6,16 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import reduce, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import Finite, Words, workers_type
+from benchmarks.cli.errors import BadInput, bad_input, entered
+from benchmarks.cli.options import Finite, OptionGroup, Words, option, with_options, workers_type
 
 if TYPE_CHECKING:
+    from er_gym.rollout.executor import Parallelism
     from er_gym.rollout.machines import Machines
 
 EXECUTORS = ("local", "ray")
@@ -34,6 +34,12 @@ class Workforce:
     machines: Machines
     workers: int
 
+    def parallelism(self, concurrency: int = 1) -> Parallelism:
+        """The workers for a run with so many episodes at once, where one process plays several."""
+        from er_gym.rollout.executor import Parallelism
+
+        return Parallelism(self.workers, concurrency, machines=self.machines)
+
     def must_see(self, path: Path) -> None:
         """Raise BadInput if workers of other nodes cannot read a file or folder of this machine."""
         if not self.machines.shares_files:
@@ -44,26 +50,42 @@ class Workforce:
 
 
 @dataclass(frozen=True)
-class ExecutorOptions:
-    """The options that say where worker processes run; None if one was not given."""
+class ExecutorOptions(OptionGroup):
+    """The options that say where worker processes run; None if one was not given.
+
+    Raises:
+        BadInput: options do not go together; the message says which.
+    """
 
     workers: int | None = None
-    executor: str | None = None
-    ray_address: str | None = None
-    shared_dir: bool | None = None
-    worker_cpus: float | None = None
-    worker_memory: float | None = None
+    executor: str | None = option(
+        type=click.Choice(EXECUTORS),
+        help="Where the workers are: processes of this machine, or a Ray cluster.  "
+        "[default: local]",
+    )
+    ray_address: str | None = option(
+        type=Words(),
+        metavar="ADDRESS",
+        help="The cluster: auto, HOST:PORT or ray://HOST:PORT.  [default: start Ray here]",
+    )
+    shared_dir: bool = option(
+        is_flag=True,
+        help="Every node of the cluster sees this machine's files under the same paths.",
+    )
+    worker_cpus: float | None = option(
+        type=Finite(min=0), help="The processors that a worker asks the cluster for.  [default: 1]"
+    )
+    worker_memory: float | None = option(
+        type=Finite(min=0.0625),
+        metavar="GIB",
+        help="The memory that a worker asks the cluster for; one that takes more is replaced.  "
+        "[default: 1]",
+    )
 
-    def check(self) -> None:
-        """Refuse options that do not go together.
-
-        Raises:
-            BadInput: the message says which.
-        """
-        for_ray = ("ray_address", "shared_dir", "worker_cpus", "worker_memory")
-        given = [f"--{name.replace('_', '-')}" for name in for_ray if getattr(self, name)]
-        if given and self.executor != "ray":
-            raise BadInput(f"{given[0]} is for --executor ray")
+    def __post_init__(self) -> None:
+        for_ray = [flag for flag in self.given if flag != "--executor"]
+        if for_ray and self.executor != "ray":
+            raise BadInput(f"{for_ray[0]} is for --executor ray")
         if self.shared_dir and not self.ray_address:
             raise BadInput(
                 "--shared-dir is for --ray-address; a Ray on this machine sees its files anyway"
@@ -71,12 +93,12 @@ class ExecutorOptions:
 
     def arguments(self) -> list[str]:
         """The same options but for --workers, for another command."""
-        told: list[str] = []
-        for name, value in vars(self).items():
-            if name != "workers" and value is not None:
-                told.append(f"--{name.replace('_', '-')}")
-                told += [] if value is True else [str(value)]
-        return told
+        values = {flag: getattr(self, flag[2:].replace("-", "_")) for flag in self.given}
+        return [
+            word
+            for flag, value in values.items()
+            for word in ([flag] if value is True else [flag, str(value)])
+        ]
 
     @contextmanager
     def workforce(
@@ -91,11 +113,10 @@ class ExecutorOptions:
             agents: names of agents whose modules the workers need.
 
         Raises:
-            BadInput: the options do not go together, or there is no such cluster.
+            BadInput: there is no such cluster.
         """
         from er_gym.rollout.machines import THIS_MACHINE
 
-        self.check()
         if self.executor != "ray":
             yield Workforce(THIS_MACHINE, self.workers or default)
             return
@@ -108,48 +129,10 @@ class ExecutorOptions:
                 address=self.ray_address or "",
                 cpus=1.0 if self.worker_cpus is None else self.worker_cpus,
                 memory=int((self.worker_memory or 1.0) * _GIB),
-                shared_files=bool(self.shared_dir),
+                shared_files=self.shared_dir,
             )
-            joined = ray_machines(settings, say, modules_of(agents))
-            machines = joined.__enter__()
-        try:
+        with entered(lambda: ray_machines(settings, say, modules_of(agents))) as machines:
             yield Workforce(machines, self.workers or machines.places)
-        finally:
-            joined.__exit__(None, None, None)
-
-
-_OPTIONS = (
-    click.option(
-        "--executor",
-        type=click.Choice(EXECUTORS),
-        help="Where the workers are: processes of this machine, or a Ray cluster.  "
-        "[default: local]",
-    ),
-    click.option(
-        "--ray-address",
-        type=Words(),
-        metavar="ADDRESS",
-        help="The cluster: auto, HOST:PORT or ray://HOST:PORT.  [default: start Ray here]",
-    ),
-    click.option(
-        "--shared-dir",
-        is_flag=True,
-        default=None,
-        help="Every node of the cluster sees this machine's files under the same paths.",
-    ),
-    click.option(
-        "--worker-cpus",
-        type=Finite(min=0),
-        help="The processors that a worker asks the cluster for.  [default: 1]",
-    ),
-    click.option(
-        "--worker-memory",
-        type=Finite(min=0.0625),
-        metavar="GIB",
-        help="The memory that a worker asks the cluster for; one that takes more is replaced.  "
-        "[default: 1]",
-    ),
-)
 
 
 def with_executor_options(
@@ -165,17 +148,10 @@ def with_executor_options(
     number = click.option(
         "--workers", type=workers_type, help=f"The number of processes.  [default: {shown}]"
     )
-    added = (number, *_OPTIONS) if workers else _OPTIONS
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
-        @wraps(command)
-        def with_options(**given: Any) -> Any:
-            names = ExecutorOptions.__dataclass_fields__
-            options = ExecutorOptions(**{name: given.pop(name, None) for name in names})
-            options.check()
-            return command(executor_options=options, **given)
-
-        return reduce(lambda made, option: option(made), reversed(added), with_options)
+        command = with_options(executor_options=ExecutorOptions)(command)
+        return number(command) if workers else command
 
     return add
 

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
-from benchmarks.cli.options import Place, Words, overrides_option
+from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, needing, print_problem
+from benchmarks.cli.options import (
+    FOLDER,
+    PATH,
+    OptionGroup,
+    Words,
+    option,
+    overrides_option,
+    shared,
+    with_options,
+)
 from benchmarks.terminal import echo
 
 if TYPE_CHECKING:
@@ -21,62 +31,54 @@ PRINTABLE = ("llama-factory", "ms-swift", "trl", "deepspeed")
 compares."""
 
 
+@dataclass(frozen=True)
+class FinetuneOptions(OptionGroup):
+    """What is trained, on what, and where the run is written."""
+
+    config: str = option(
+        required=True,
+        metavar="FILE",
+        help="The settings: a YAML file, or the name of one that comes with er-gym, such as "
+        "stage1.",
+    )
+    overrides: tuple[str, ...] = shared(overrides_option("training.epochs=2 or model.lora.rank=16"))
+    model: str = option(
+        required=True,
+        type=Words(),
+        metavar="DIR",
+        help="The model: a directory that save_pretrained wrote, or an earlier run; for --print "
+        "also a name such as qwen2-vl-7b.",
+    )
+    data: tuple[Path, ...] = option(
+        required=True,
+        multiple=True,
+        type=PATH,
+        metavar="PATH",
+        help="What is learnt: a collection of er-gym collect, or a ShareGPT file; may be repeated.",
+    )
+    out: Path = option(
+        required=True,
+        type=FOLDER,
+        help="The run directory; the same command again continues it.",
+    )
+    ignore_memory: bool = option(
+        is_flag=True, help="Train although by the estimate it does not fit into the memory."
+    )
+    program: str | None = option(
+        "--print",
+        type=click.Choice(PRINTABLE),
+        help="Train nothing; write the complete files with which this program makes the run.",
+    )
+    gpus: int | None = option(
+        type=click.IntRange(min=1),
+        help="With --print: how many GPUs.  [default: 8, LoRA 1]",
+    )
+    copy: bool = option(is_flag=True, help="With --print: copy pictures instead of linking them.")
+
+
 @click.command()
-@click.option(
-    "--config",
-    required=True,
-    metavar="FILE",
-    help="The settings: a YAML file, or the name of one that comes with er-gym, such as stage1.",
-)
-@overrides_option("training.epochs=2 or model.lora.rank=16")
-@click.option(
-    "--model",
-    required=True,
-    type=Words(),
-    metavar="DIR",
-    help="The model: a directory that save_pretrained wrote, or an earlier run; for --print also a "
-    "name such as qwen2-vl-7b.",
-)
-@click.option(
-    "--data",
-    required=True,
-    multiple=True,
-    type=Place(path_type=Path),
-    metavar="PATH",
-    help="What is learnt: a collection of er-gym collect, or a ShareGPT file; may be repeated.",
-)
-@click.option(
-    "--out",
-    required=True,
-    type=Place(file_okay=False, path_type=Path),
-    help="The run directory; the same command again continues it.",
-)
-@click.option(
-    "--ignore-memory",
-    is_flag=True,
-    help="Train although by the estimate it does not fit into the memory.",
-)
-@click.option(
-    "--print",
-    "program",
-    type=click.Choice(PRINTABLE),
-    help="Train nothing; write the complete files with which this program makes the run.",
-)
-@click.option(
-    "--gpus", type=click.IntRange(min=1), help="With --print: how many GPUs.  [default: 8, LoRA 1]"
-)
-@click.option("--copy", is_flag=True, help="With --print: copy pictures instead of linking them.")
-def finetune(
-    config: str,
-    overrides: tuple[str, ...],
-    model: str,
-    data: tuple[Path, ...],
-    out: Path,
-    ignore_memory: bool,
-    program: str | None,
-    gpus: int | None,
-    copy: bool,
-) -> int:
+@with_options(options=FinetuneOptions)
+def finetune(options: FinetuneOptions) -> int:
     """Fine-tune a language or vision-language model on trajectories; needs the extra finetune.
 
     On several GPUs: accelerate launch -m benchmarks.cli finetune … The same command again continues
@@ -86,28 +88,23 @@ def finetune(
     from er_gym.activity import begin_import
 
     with bad_input():
-        settings = load_settings(config, overrides)
-    if program is not None:
-        _print_run(program, settings, model, data, out, gpus, copy)
+        settings = load_settings(options.config, options.overrides)
+    if options.program is not None:
+        _print_run(options.program, settings, options)
         return 0
-    if gpus is not None or copy:
+    if options.gpus is not None or options.copy:
         raise BadInput("--gpus and --copy are for --print; leave them out")
     begin_import("PyTorch, transformers and peft", "torch", "transformers", "peft")
-    try:
+    with needing("fine-tuning", "er-gym[finetune]"):
         from agents.finetune import train as training
-    except ImportError as error:
-        raise BadInput(
-            f"{error.name or error} is not installed, and fine-tuning needs it: "
-            "pip install 'er-gym[finetune]'"
-        ) from error
     try:
         with bad_input():
             result = training.train(
                 settings,
-                Path(model),
-                data,
-                out,
-                ignore_memory=ignore_memory,
+                Path(options.model),
+                options.data,
+                options.out,
+                ignore_memory=options.ignore_memory,
                 report=_say_progress,
                 say=lambda text: echo(text, err=True),
             )
@@ -116,10 +113,10 @@ def finetune(
             f"{error}; the same command continues from the last checkpoint, if there is one"
         ) from error
     except KeyboardInterrupt:
-        kept = out.exists()
-        left = f"the same command continues from the last checkpoint in {out}" if kept else ""
+        kept = options.out.exists()
+        left = f"the same command continues from the last checkpoint in {options.out}"
         print_problem(
-            f"interrupted; {left or 'nothing had been saved, and nothing is left behind'}"
+            f"interrupted; {left if kept else 'nothing had been saved, and nothing is left behind'}"
         )
         return INTERRUPTED
     if training.machine.is_first():
@@ -127,25 +124,26 @@ def finetune(
     return 0
 
 
-def _print_run(
-    program: str,
-    settings: FinetuneSettings,
-    model: str,
-    data: tuple[Path, ...],
-    out: Path,
-    gpus: int | None,
-    copy: bool,
-) -> None:
+def _print_run(program: str, settings: FinetuneSettings, options: FinetuneOptions) -> None:
     """Write the files of another program's run, and name them."""
     from er_gym.activity import begin_import
 
     begin_import("PyTorch and transformers", "torch", "transformers")
     from agents.finetune.printing import write_files
 
-    if len(data) > 1:
-        raise BadInput(f"--print takes one --data, not {len(data)}; print a run for each")
+    data, *more = options.data
+    if more:
+        raise BadInput(f"--print takes one --data, not {len(options.data)}; print a run for each")
     with bad_input():
-        files = write_files(program, settings, model, data[0], out, gpus=gpus, copy=copy)
+        files = write_files(
+            program,
+            settings,
+            options.model,
+            data,
+            options.out,
+            gpus=options.gpus,
+            copy=options.copy,
+        )
     for file in files:
         echo(file)
 

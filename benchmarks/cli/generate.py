@@ -13,7 +13,7 @@ import click
 from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
-from benchmarks.cli.options import MOST_SEED, Span, force_option, split
+from benchmarks.cli.options import FILE, MOST_SEED, Span, force_option, split
 from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ _DEFAULT_TOTAL = 100
 @click.option("--suite", help="Generate this suite as its configuration says.")
 @click.option(
     "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FILE,
     help="The task file, .jsonl or .jsonl.gz.  [default: where er-gym looks for the suite]",
 )
 @click.option(
@@ -197,24 +197,21 @@ def _build(
     order: _Order, parts: Path, options: ExecutorOptions, console: Console
 ) -> tuple[BuildResult, int]:
     """Build the tasks and show progress; returns the chosen ones, and how many were verified."""
-    from benchmarks.cli.progress import bar
+    from benchmarks.cli.progress import LiveProgress
     from benchmarks.cli.suite_builder import build_suite
 
     rooms = len(order.spec.rooms)
     verified = done = 0
-    with (
-        options.workforce(lambda line: console.print(line, style="dim"), processors()) as workforce,
-        bar(console) as progress,
-    ):
-        shown = progress.add_task("generating tasks", total=rooms, status="")
+    shown = LiveProgress(console, "generating tasks", rooms)
 
-        def on_room(scene: str, made: BuildResult) -> None:
-            nonlocal verified, done
-            verified, done = verified + len(made.tasks), done + 1
-            progress.update(shown, advance=1, status=f"{verified} verified, last {scene}")
-            if not console.is_terminal and done * 10 // rooms > (done - 1) * 10 // rooms:
-                console.print(f"{done}/{rooms} rooms, {verified} tasks verified")
+    def on_room(scene: str, made: BuildResult) -> None:
+        nonlocal verified, done
+        verified, done = verified + len(made.tasks), done + 1
+        shown.update(completed=done, status=f"{verified} verified, last {scene}")
+        if shown.is_line_due(done):
+            shown.print_line(f"{done}/{rooms} rooms, {verified} tasks verified")
 
+    with options.workforce(shown.say, processors()) as workforce, shown:
         made = build_suite(
             order.spec,
             order.seed,

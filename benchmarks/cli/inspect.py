@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli.activity import doing
-from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
+from benchmarks.cli.errors import CRASHED, BadInput, bad_input, needing, print_problem
 from benchmarks.cli.options import Words, agent_config_option, overrides_option, seed_option
 from benchmarks.terminal import echo
 
@@ -61,7 +61,7 @@ def inspect(
     from er_gym.activity import begin_import
 
     begin_import("Inspect", "inspect_ai", "textual")
-    try:
+    with needing("Inspect", "er-gym[inspect]"):
         # Inspect's display on a terminal; it would import this later, while nothing is said.
         import textual.app
         import textual.widgets  # noqa: F401
@@ -70,10 +70,6 @@ def inspect(
 
         from benchmarks.inspect_secrets import model_at_url
         from benchmarks.inspect_task import er_gym
-    except ImportError as error:
-        raise BadInput(
-            f"{error.name} is not installed, and Inspect needs it: pip install 'er-gym[inspect]'"
-        ) from error
     with bad_input():
         doing("reading the suite")
         asked = er_gym(suite, limit, agent_config, overrides, seed)

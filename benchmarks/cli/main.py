@@ -32,7 +32,7 @@ from benchmarks.cli.finetune import finetune
 from benchmarks.cli.inspect import inspect
 from benchmarks.cli.ladder import ladder
 from benchmarks.cli.new_model import new_model
-from benchmarks.cli.options import scorer_option
+from benchmarks.cli.options import FOLDER, scorer_option
 from benchmarks.cli.player import player
 from benchmarks.cli.prompts import prompts
 from benchmarks.cli.render import play, render
@@ -44,7 +44,6 @@ from benchmarks.cli.zoo import zoo
 from benchmarks.terminal import echo, stdout, terminal, use_any_encoding
 
 FORMATS = ("table", "md", "csv", "json")
-_directory = click.Path(file_okay=False, path_type=Path)
 
 
 def main(args: Sequence[str] | None = None) -> NoReturn:
@@ -120,7 +119,7 @@ cli.add_command(zoo)
 
 
 @cli.command()
-@click.argument("runs", nargs=-1, required=True, metavar="RUN...", type=_directory)
+@click.argument("runs", nargs=-1, required=True, metavar="RUN...", type=FOLDER)
 @click.option("--format", "layout", type=click.Choice(FORMATS), default="table", show_default=True)
 @scorer_option
 @click.option("--by-type", is_flag=True, help="Add every metric for each group and task type.")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import MOST_SEED, Place, overrides_option
+from benchmarks.cli.errors import bad_input, needing
+from benchmarks.cli.options import FOLDER, MOST_SEED, overrides_option
 from benchmarks.terminal import echo
 
 
@@ -19,14 +19,11 @@ from benchmarks.terminal import echo
     "collections",
     multiple=True,
     required=True,
-    type=Place(file_okay=False, path_type=Path),
+    type=FOLDER,
     help="A collection, or frames, from which the tokenizer learns; may be repeated.",
 )
 @click.option(
-    "--dialect",
-    default="paper",
-    show_default=True,
-    help="How its trajectories are put into words.",
+    "--dialect", default="paper", show_default=True, help="How its trajectories are put into words."
 )
 @overrides_option("vocabulary=2048")
 @click.option(
@@ -36,12 +33,7 @@ from benchmarks.terminal import echo
     show_default=True,
     help="Of the weights.",
 )
-@click.option(
-    "--out",
-    required=True,
-    type=Place(file_okay=False, path_type=Path),
-    help="The directory of the model.",
-)
+@click.option("--out", required=True, type=FOLDER, help="The directory of the model.")
 def new_model(
     architecture: str,
     collections: tuple[Path, ...],
@@ -62,13 +54,8 @@ def new_model(
         made = load_architecture(architecture, overrides)
         texts = _texts(collections, dialect)
     begin_import("PyTorch and transformers", "torch", "transformers")
-    try:
+    with needing("a new model", "er-gym[local]"):
         from agents.finetune.new_model import make_model
-    except ImportError as error:
-        raise BadInput(
-            f"{error.name or error} is not installed, and a new model needs it: "
-            "pip install 'er-gym[local]'"
-        ) from error
     with bad_input():
         make_model(made, texts, out, seed)
     size = sum(file.stat().st_size for file in out.glob("*.safetensors"))

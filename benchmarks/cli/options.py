@@ -1,9 +1,12 @@
-"""Options that several commands have."""
+"""Options that several commands have, and groups that a command takes as one argument."""
 
 from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
+from dataclasses import Field, dataclass, field, fields
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +14,74 @@ import click
 
 from benchmarks.cli.errors import BadInput
 
+
+@dataclass(frozen=True)
+class OptionGroup:
+    """Options of a command, a field each; a subclass makes its fields with :func:`option`."""
+
+    @property
+    def given(self) -> list[str]:
+        """The options that the command line gives, as they are written there."""
+        return [
+            _added(each)[0]
+            for each in fields(self)
+            if each.metadata and _is_given(getattr(self, each.name))
+        ]
+
+
+def _is_given(value: object) -> bool:
+    return value is not None and value is not False and value != ()
+
+
+def option(flag: str = "", **settings: Any) -> Any:
+    """A field of a group that an option fills.
+
+    Args:
+        flag: the option, where that is not the field's name: ``--max-usd`` for ``max_usd``.
+        settings: those of :func:`click.option`.
+    """
+    empty: Any = () if settings.get("multiple") else False if settings.get("is_flag") else None
+    return field(default=empty, metadata={"flag": flag, "settings": settings})
+
+
+def shared(add: Any) -> Any:
+    """A field of a group that an option fills which other commands have, too."""
+    (made,) = add(lambda: None).__click_params__
+    return field(default=() if made.multiple else None, metadata={"add": add, "flag": made.opts[0]})
+
+
+def _added(each: Field[Any]) -> tuple[str, Any]:
+    """A field's option as it is written, and what adds it to a command."""
+    flag = each.metadata.get("flag") or f"--{each.name.replace('_', '-')}"
+    if "settings" in each.metadata:
+        return flag, click.option(flag, each.name, **each.metadata["settings"])
+    return flag, each.metadata.get("add", lambda command: command)
+
+
+def with_options(**groups: type[OptionGroup]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add the options of groups to a command, which gets each group as an argument of its name."""
+
+    def add(command: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(command)
+        def with_groups(**given: Any) -> Any:
+            for name, group in groups.items():
+                values = {each.name: given.pop(each.name, each.default) for each in fields(group)}
+                given[name] = group(**values)
+            return command(**given)
+
+        for group in reversed(groups.values()):
+            for each in reversed(fields(group)):
+                _added(each)[1](with_groups)
+        return with_groups
+
+    return add
+
+
+LANGUAGES = ("en", "zh")
+"""As in ``er_gym.data.trajectory``, which is too slow to import for ``--help``; a test compares."""
+
 SCORER_CHOICES = ("both", "paper", "corrected")
-"""As in ``benchmarks.scoring.report``, which is too slow to import for ``--help``; a test
-compares."""
+"""As in ``benchmarks.scoring.report``, for the same reason."""
 
 scorer_option = click.option(
     "--scorer",
@@ -84,19 +152,28 @@ workers_option = click.option(
 )
 
 
-def size_options(command: Any) -> Any:
-    """``--width`` and ``--height``, of pictures; None for the suite's own."""
-    for name in ("--height", "--width"):
-        command = click.option(
-            name, type=click.IntRange(16, 4096), help="Of pictures, pixels.  [default: the suite's]"
-        )(command)
-    return command
+def size_option(name: str) -> Any:
+    """``--width`` or ``--height``, of pictures; None for the suite's own."""
+    return click.option(
+        name, type=click.IntRange(16, 4096), help="Of pictures, pixels.  [default: the suite's]"
+    )
 
 
 def given_size(width: int | None, height: int | None) -> dict[str, int]:
     """The environment's arguments that these options give."""
     size = {"width": width, "height": height}
     return {name: pixels for name, pixels in size.items() if pixels is not None}
+
+
+def port_option(default: int) -> Any:
+    """``--port``, of a server."""
+    return click.option(
+        "--port",
+        type=click.IntRange(0, 65535),
+        default=default,
+        show_default=True,
+        help="The port; 0 for a free one.",
+    )
 
 
 force_option = click.option(
@@ -155,7 +232,11 @@ class Words(click.ParamType):
         return str(value)
 
 
+PATH = Place(path_type=Path)
+FILE = Place(dir_okay=False, path_type=Path)
+FOLDER = Place(file_okay=False, path_type=Path)
 EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+EXISTING_FOLDER = Place(exists=True, file_okay=False, path_type=Path)
 
 
 class Finite(click.FloatRange):

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import Place, force_option
+from benchmarks.cli.options import FOLDER, force_option
 from benchmarks.terminal import echo
 
 
@@ -61,7 +61,7 @@ def prompts(context: click.Context) -> None:
 
 
 @prompts.command()
-@click.argument("directory", metavar="DIR", type=Place(file_okay=False, path_type=Path))
+@click.argument("directory", metavar="DIR", type=FOLDER)
 @click.option(
     "--from",
     "name",

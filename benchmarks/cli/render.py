@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import Finite, Place, force_option, seed_option
+from benchmarks.cli.options import FILE, FOLDER, Finite, force_option, seed_option
 from benchmarks.terminal import echo
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ _TOP_VIEW_FOV = 60.0
 @click.option("--annotate", is_flag=True, help="Label objects with their types.")
 @click.option(
     "--out", default=Path("room.png"), show_default=True, help="The picture's file.",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FILE,
 )  # fmt: skip
 @force_option
 def render(
@@ -163,7 +163,7 @@ def _top_view(controller: Any) -> Any:
 @seed_option
 @click.option(
     "--frames", default=Path("frames"), show_default=True,
-    type=Place(file_okay=False, path_type=Path), help="The folder for each step's picture.",
+    type=FOLDER, help="The folder for each step's picture.",
 )  # fmt: skip
 @force_option
 @click.option(

@@ -6,6 +6,7 @@ import shlex
 import signal
 import socket
 import sys
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +15,16 @@ import click
 
 from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
-from benchmarks.cli.options import Finite, agent_config_option, overrides_option
+from benchmarks.cli.options import (
+    Finite,
+    OptionGroup,
+    agent_config_option,
+    option,
+    overrides_option,
+    port_option,
+    shared,
+    with_options,
+)
 from benchmarks.terminal import echo, plain
 
 if TYPE_CHECKING:
@@ -27,66 +37,49 @@ ENGINE_CHOICES = ("vllm", "transformers", "llama_cpp")
 _TERMINATED = 143
 
 
+@dataclass(frozen=True)
+class ServerOptions(OptionGroup):
+    """How a model is served."""
+
+    engine: str | None = option(
+        type=click.Choice(ENGINE_CHOICES),
+        help="The server program.  [default: chosen by model and machine]",
+    )
+    port: int = shared(port_option(8000))
+    name: str = option(default="", help="The model's name in requests.")
+    context: int | None = option(
+        type=click.IntRange(min=1),
+        help="The most tokens in a conversation; not for transformers.",
+    )
+    pictures: int = option(
+        type=click.IntRange(min=0),
+        default=40,
+        show_default=True,
+        help="The most pictures in a conversation; vllm only.",
+    )
+    gpus: int | None = option(
+        type=click.IntRange(min=0), help="The number of GPUs to use.  [default: all]"
+    )
+    python: str = option(
+        default=sys.executable,
+        help="The Python that has the server's packages.  [default: this one]",
+    )
+    patience: float = option(
+        type=Finite(min=0, min_open=True),
+        default=1200.0,
+        show_default=True,
+        metavar="SECONDS",
+        help="How long the server may take to load the model.",
+    )
+    verbose: bool = option(is_flag=True, help="Show what the server writes.")
+    dry_run: bool = option(is_flag=True, help="Only print the server's command.")
+
+
 @click.command(epilog="Arguments after -- go to the server unchanged.")
 @click.argument("model")
 @click.argument("more", nargs=-1, metavar="[-- ARGUMENTS...]", type=click.UNPROCESSED)
-@click.option(
-    "--engine",
-    type=click.Choice(ENGINE_CHOICES),
-    help="The server program.  [default: chosen by model and machine]",
-)
-@click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=8000,
-    show_default=True,
-    help="The port; 0 for a free one.",
-)
-@click.option("--name", default="", help="The model's name in requests.")
-@click.option(
-    "--context",
-    type=click.IntRange(min=1),
-    help="The most tokens in a conversation; not for transformers.",
-)
-@click.option(
-    "--pictures",
-    type=click.IntRange(min=0),
-    default=40,
-    show_default=True,
-    help="The most pictures in a conversation; vllm only.",
-)
-@click.option(
-    "--gpus", type=click.IntRange(min=0), help="The number of GPUs to use.  [default: all]"
-)
-@click.option(
-    "--python",
-    default=sys.executable,
-    help="The Python that has the server's packages.  [default: this one]",
-)
-@click.option(
-    "--patience",
-    type=Finite(min=0, min_open=True),
-    default=1200.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="How long the server may take to load the model.",
-)
-@click.option("--verbose", is_flag=True, help="Show what the server writes.")
-@click.option("--dry-run", is_flag=True, help="Only print the server's command.")
-def serve(
-    model: str,
-    more: tuple[str, ...],
-    engine: str | None,
-    port: int,
-    name: str,
-    context: int | None,
-    pictures: int,
-    gpus: int | None,
-    python: str,
-    patience: float,
-    verbose: bool,
-    dry_run: bool,
-) -> int:
+@with_options(server_options=ServerOptions)
+def serve(model: str, more: tuple[str, ...], server_options: ServerOptions) -> int:
     """Start a server for a model, for `er-gym bench --agent openai:MODEL` to play with.
 
     MODEL is a directory, a run of er-gym finetune, a .gguf file or a name on a model hub. llama.cpp
@@ -106,18 +99,18 @@ def serve(
         directory = Path(model_directory(model))
         whole = str(merged_directory(directory)) if directory.is_dir() else model
         options = ServeOptions(
-            port=_usable_port(port),
-            engine=engine or "",
-            name=name,
-            pictures=pictures,
+            port=_usable_port(server_options.port),
+            engine=server_options.engine or "",
+            name=server_options.name,
+            pictures=server_options.pictures,
             pixels=settings.pictures.model_bounds,
             agent_config=str(tuned_for or ""),
-            context=context,
-            gpus=gpus,
+            context=server_options.context,
+            gpus=server_options.gpus,
             more=more,
         )
-        command = command_for(whole, options, inspect_machine(python))
-    if dry_run:
+        command = command_for(whole, options, inspect_machine(server_options.python))
+    if server_options.dry_run:
         echo(_as_shell(command))
         return 0
     if directory.is_dir() and whole != str(directory):
@@ -125,17 +118,11 @@ def serve(
         doing("merging")
         with bad_input():
             merge(directory)
-    return run_server(command, patience=patience, verbose=verbose)
+    return run_server(command, patience=server_options.patience, verbose=server_options.verbose)
 
 
 @click.command(name="match-server")
-@click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=8001,
-    show_default=True,
-    help="The port; 0 for a free one.",
-)
+@port_option(8001)
 @agent_config_option
 @overrides_option("matching.fuzzy=90")
 def match_server(port: int, agent_config: str | None, overrides: tuple[str, ...]) -> int:

@@ -12,7 +12,8 @@ from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import BadInput, bad_input, report_set_aside
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
 from benchmarks.cli.generate import generate
-from benchmarks.cli.options import Place, force_option, split
+from benchmarks.cli.options import FOLDER, PATH, force_option, split
+from benchmarks.cli.suites import fitted_tasks, refuse_if_none
 from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
@@ -37,36 +38,35 @@ def verify(suites: tuple[str, ...], executor_options: ExecutorOptions) -> int:
     scene. The solver knows the key actions; it must succeed from the task's own start, within the
     step limit, and earn the whole reward.
     """
-    from contextlib import ExitStack, closing
+    from contextlib import closing
     from operator import attrgetter
 
     from benchmarks.cli.progress import Progress
     from er_gym.rollout.verification import make_verifier
     from er_gym.rollout.worker_pool import LostJob
-    from er_gym.tasks.errors import summarise_set_aside
-    from er_gym.tasks.resolve import resolve_tasks
 
     console = terminal(stderr=True)
     failed = 0
     for name in suites:
         with bad_input():
             suite = _suite(name)
-            fitted = resolve_tasks(suite.tasks)
-            todo, aside = fitted.tasks, (*suite.set_aside, *fitted.set_aside)
-            if aside and not todo:
-                raise BadInput(f"{suite.name}: no task can be played: {summarise_set_aside(aside)}")
+            fitted = fitted_tasks(suite)
+        todo, aside = fitted.tasks, fitted.set_aside
         report_set_aside(suite.name, (), fitted.substitutions)
         for one in aside:
             echo(f"{suite.name}: set aside: {one}")
         solved = 0
         progress = Progress(console, suite.name, len(todo))
-        with ExitStack() as stack:
-            workforce = stack.enter_context(executor_options.workforce(progress.say, processors()))
-            stack.enter_context(progress)
-            results = workforce.machines.run_jobs(
-                make_verifier, todo, workers=workforce.workers, room=attrgetter("scene")
-            )
-            for task, verdict in stack.enter_context(closing(results)):
+        with (
+            executor_options.workforce(progress.say, processors()) as workforce,
+            progress,
+            closing(
+                workforce.machines.run_jobs(
+                    make_verifier, todo, workers=workforce.workers, room=attrgetter("scene")
+                )
+            ) as results,
+        ):
+            for task, verdict in results:
                 problem, detail = "the engine died", ""
                 if not isinstance(verdict, LostJob):
                     problem, detail = verdict.problem, verdict.detail
@@ -100,7 +100,6 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
 
     from er_gym.tasks.describe import describe
     from er_gym.tasks.difficulty import Difficulty
-    from er_gym.tasks.errors import summarise_set_aside
     from er_gym.tasks.resolve import resolve_tasks
     from er_gym.tasks.types import BY_NAME, types_named
 
@@ -122,8 +121,7 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
             chosen = [task for of_kind in by_kind for task in of_kind[:limit]]
         fitted = resolve_tasks(chosen)
         aside += fitted.set_aside
-        if aside and not fitted.tasks:
-            raise BadInput(f"{suite}: no task to show: {summarise_set_aside(aside)}")
+        refuse_if_none(fitted.tasks, aside, f"{suite}: no task to show")
     report_set_aside(suite, aside, fitted.substitutions)
     names = [field.name for field in fields(Difficulty)]
     pages = []
@@ -140,11 +138,7 @@ def show(suite: str, ids: tuple[str, ...], limit: int, types: str | None) -> Non
 
 @tasks.command()
 @click.argument("suite", metavar="SUITE|FILE")
-@click.option(
-    "--out",
-    type=Place(file_okay=False, path_type=Path),
-    help=("Draw the charts into this folder, as PNG."),
-)
+@click.option("--out", type=FOLDER, help=("Draw the charts into this folder, as PNG."))
 @force_option
 def stats(suite: str, out: Path | None, force: bool) -> None:
     """Count a suite's tasks by type, room, scene and split, and draw the distributions."""
@@ -164,7 +158,7 @@ def stats(suite: str, out: Path | None, force: bool) -> None:
 
 @tasks.command()
 @click.argument("suite", metavar="SUITE|FILE|FOLDER")
-@click.argument("out", metavar="FILE|FOLDER", type=Place(path_type=Path))
+@click.argument("out", metavar="FILE|FOLDER", type=PATH)
 @click.option(
     "--task-ids", multiple=True, metavar="ID,…", help="Convert these tasks; may be repeated."
 )
@@ -181,15 +175,13 @@ def convert(suite: str, out: Path, task_ids: tuple[str, ...], force: bool) -> No
     """
     from er_gym.rollout.selection import select
     from er_gym.tasks import jsonl_format, paper_format
-    from er_gym.tasks.errors import summarise_set_aside
     from er_gym.tasks.paper_generator import read_generated, write_generator_tasks
 
     with bad_input():
         read = read_generated(suite) if Path(suite).is_dir() else _suite(suite)
         aside = read.set_aside
         found = select(read.tasks, task_ids=split(*task_ids), set_aside=aside)
-        if aside and not found:
-            raise BadInput(f"{suite}: no task can be read: {summarise_set_aside(aside)}")
+        refuse_if_none(found, aside, f"{suite}: no task can be read")
         report_set_aside(suite, aside)
         doing(f"writing {out}")
         if out.name.endswith((".jsonl", ".jsonl.gz")):

@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
-from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
-from benchmarks.cli.options import MOST_SEED, Place, overrides_option
+from benchmarks.cli.errors import INTERRUPTED, bad_input, needing, print_problem
+from benchmarks.cli.options import FOLDER, MOST_SEED, overrides_option
 from benchmarks.terminal import echo
 
 
@@ -29,11 +29,7 @@ from benchmarks.terminal import echo
     "[default: the configuration's]",
 )
 @click.option("--seed", type=click.IntRange(0, MOST_SEED), help="[default: the configuration's]")
-@click.option(
-    "--out",
-    type=Place(file_okay=False, path_type=Path),
-    help="The run directory.  [default: runs/rl/CONFIG-SEED]",
-)
+@click.option("--out", type=FOLDER, help="The run directory.  [default: runs/rl/CONFIG-SEED]")
 def train_rl(
     config: str,
     overrides: tuple[str, ...],
@@ -56,13 +52,8 @@ def train_rl(
         wanted = load_config(file, (*overrides, *chosen), more)
     run = out or Path("runs") / "rl" / f"{file.stem}-{wanted.seed}"
     begin_import("PyTorch and Stable-Baselines3", "torch", "stable_baselines3", "sb3_contrib")
-    try:
+    with needing("training", "er-gym[rl]"):
         from agents.rl import train as training
-    except ImportError as error:
-        raise BadInput(
-            f"{error.name or error} is not installed, and training needs it: "
-            "pip install 'er-gym[rl]'"
-        ) from error
     try:
         with bad_input():
             model = training.train(wanted, run, show_progress=True)

@@ -15,10 +15,10 @@ from types import FrameType
 
 import click
 
-from benchmarks.cli.errors import BadInput
-from benchmarks.cli.options import Place
-from benchmarks.cli.ui_export import FileOptions, file_options, write_files
-from benchmarks.cli.vlm_options import VLMOptions, with_vlm_options
+from benchmarks.cli.errors import BadInput, needing
+from benchmarks.cli.options import EXISTING_FOLDER, FOLDER, port_option, with_options
+from benchmarks.cli.ui_export import FileOptions, write_files
+from benchmarks.cli.vlm_options import VLMOptions
 from benchmarks.terminal import echo
 
 _LOOPBACK = "127.0.0.1"
@@ -46,12 +46,7 @@ def _open_browser(address: str) -> None:
 
 
 @click.command(name="ui")
-@click.argument(
-    "folders",
-    nargs=-1,
-    type=Place(exists=True, file_okay=False, path_type=Path),
-    metavar="[FOLDER]...",
-)
+@click.argument("folders", nargs=-1, type=EXISTING_FOLDER, metavar="[FOLDER]...")
 @click.option(
     "--host",
     default=_LOOPBACK,
@@ -59,23 +54,16 @@ def _open_browser(address: str) -> None:
     help="The address to listen on. Any other than this machine's own needs a token, which is "
     "printed.",
 )
-@click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=8010,
-    show_default=True,
-    help="The port; 0 for a free one.",
-)
+@port_option(8010)
 @click.option("--token", help="The token for another --host.  [default: a random one]")
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
 @click.option(
     "--play",
-    type=Place(file_okay=False, path_type=Path),
+    type=FOLDER,
     metavar="OUT",
     help="Let a person play, alone or in place of an agent; the runs are written below OUT.",
 )
-@file_options
-@with_vlm_options
+@with_options(files=FileOptions, vlm_options=VLMOptions)
 def ui(
     folders: tuple[Path, ...],
     host: str,
@@ -93,17 +81,13 @@ def ui(
 
     With --export or --video nothing is shown: a run's pages, or an episode's video, are written.
     """
-    try:
+    with needing("er-gym ui", "er-gym[ui]"):
         import uvicorn
 
         from benchmarks.monitor.app import make_app
 
         if write_files(files):
             return 0
-    except ImportError as error:
-        raise BadInput(
-            f"{error.name} is not installed, and er-gym ui needs it: pip install 'er-gym[ui]'"
-        ) from error
     if play is None and vlm_options.given:
         raise BadInput(f"{vlm_options.given[0]} is for agents that a person watches; give --play")
     usual = Path("runs")
@@ -128,7 +112,7 @@ def ui(
     if not no_browser:
         _open_browser(address)
     closing = threading.Event()
-    app = make_app(roots, secret, closing, play=play, options=vlm_options)
+    app = make_app(roots, secret, closing, play=play, vlm_run=vlm_options.run)
     config = uvicorn.Config(app, log_level="error", access_log=False, timeout_graceful_shutdown=5)
     server = uvicorn.Server(config)
     leave = server.handle_exit

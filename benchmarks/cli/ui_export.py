@@ -2,107 +2,59 @@
 
 from __future__ import annotations
 
-import functools
 import importlib.util
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
 from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import Place
+from benchmarks.cli.options import EXISTING_FOLDER, LANGUAGES, PATH, OptionGroup, option
 from benchmarks.terminal import echo, terminal
-
-_Command = TypeVar("_Command", bound=Callable[..., Any])
-_FOLDER = Place(exists=True, file_okay=False, path_type=Path)
-_VIDEOS = (".webp", ".mp4")
 
 
 @dataclass(frozen=True)
-class FileOptions:
-    """The options of ``er-gym ui`` for files.
+class FileOptions(OptionGroup):
+    """The options of ``er-gym ui`` for files."""
 
-    Attributes:
-        export, video: the run that becomes pages, or whose episode becomes a video.
-        out: the file or folder that is made.
-        episodes: the most replays.
-        only: which episodes have one, each ``NAME=VALUE``.
-        episode: the key of the video's.
-        draw: whether pictures are drawn where the agent was shown none.
-        language: of the words.
-        overwrite: whether what is there is replaced.
-    """
-
-    export: Path | None
-    video: Path | None
-    out: Path | None
-    episodes: int | None
-    only: tuple[str, ...]
-    episode: str | None
-    draw: bool
-    language: str
-    overwrite: bool
-
-
-_OPTIONS: Sequence[Callable[[Any], Any]] = (
-    click.option(
-        "--export",
-        type=_FOLDER,
+    export: Path | None = option(
+        type=EXISTING_FOLDER,
         metavar="RUN",
         help="Show nothing; write a run's pages to --out: one file with everything in it where the "
         "name ends in .html, else a folder.",
-    ),
-    click.option(
-        "--episodes",
+    )
+    episodes: int | None = option(
         type=click.IntRange(0),
         help="With --export: the most episodes that can be replayed.  [default: 20 in a file, "
         "all in a folder]",
-    ),
-    click.option(
-        "--only",
+    )
+    only: tuple[str, ...] = option(
         multiple=True,
         metavar="NAME=VALUE",
         help="With --export: which episodes can be replayed, as the page filters and sorts them, "
         "such as outcome=failure, type=single_search, type=Search, steps=5-10 or sort=-steps.",
-    ),
-    click.option(
-        "--draw",
+    )
+    draw: bool = option(
         is_flag=True,
         help="With --export: draw what the agent could see where it was shown no pictures.",
-    ),
-    click.option(
-        "--video",
-        type=_FOLDER,
+    )
+    video: Path | None = option(
+        type=EXISTING_FOLDER,
         metavar="RUN",
         help="Show nothing; write an episode of a run to --out as a video: .webp, or .mp4 with "
         "imageio-ffmpeg.",
-    ),
-    click.option("--episode", metavar="KEY", help="With --video: which.  [default: the first]"),
-    click.option("--out", type=Place(path_type=Path), help="What --export or --video writes."),
-    click.option(
-        "--language",
-        type=click.Choice(("en", "zh")),
+    )
+    episode: str | None = option(metavar="KEY", help="With --video: which.  [default: the first]")
+    out: Path | None = option(type=PATH, help="What --export or --video writes.")
+    language: str = option(
+        type=click.Choice(LANGUAGES),
         default="en",
         show_default=True,
         help="With --export: of the words.",
-    ),
-    click.option("--overwrite", is_flag=True, help="Replace what is at --out."),
-)
-
-
-def file_options(command: _Command) -> _Command:
-    """Adds the options; the command gets them as its argument ``files``."""
-
-    @functools.wraps(command)
-    def with_files(**given: Any) -> Any:
-        mine = {each.name: given.pop(each.name) for each in fields(FileOptions)}
-        return command(files=FileOptions(**mine), **given)
-
-    for option in reversed(_OPTIONS):
-        option(with_files)
-    return with_files  # type: ignore[return-value]
+    )
+    overwrite: bool = option(is_flag=True, help="Replace what is at --out.")
 
 
 def write_files(options: FileOptions) -> bool:
@@ -112,10 +64,7 @@ def write_files(options: FileOptions) -> bool:
         BadInput: options do not go together, or something is in the way.
     """
     if options.export is None and options.video is None:
-        alone = {"--out": options.out, "--episode": options.episode, "--only": options.only,
-                 "--episodes": options.episodes, "--draw": options.draw,
-                 "--overwrite": options.overwrite}  # fmt: skip
-        given = [name for name, value in alone.items() if value not in (None, (), False)]
+        given = [flag for flag in options.given if flag != "--language"]  # it has a default
         if given:
             raise BadInput(f"{given[0]} goes with --export RUN or --video RUN; give one of these")
         return False
@@ -128,7 +77,7 @@ def write_files(options: FileOptions) -> bool:
 
 
 def _export(options: FileOptions, out: Path) -> None:
-    from benchmarks.cli.progress import bar
+    from benchmarks.cli.progress import counting
     from benchmarks.monitor.export import USUAL_EPISODES, Wanted, export
 
     assert options.export is not None
@@ -143,12 +92,7 @@ def _export(options: FileOptions, out: Path) -> None:
         draw=options.draw,
         overwrite=options.overwrite,
     )
-    with bad_input(), bar(terminal()) as progress:
-        task = progress.add_task("episodes", total=None, status="")
-
-        def tell(done: int, of: int) -> None:
-            progress.update(task, completed=done, total=of)
-
+    with bad_input(), counting(terminal(), "episodes") as tell:
         made = export(wanted, tell)
     more = f"; --episodes {made.total} takes all" if is_file and made.n < made.total else ""
     echo(f"{out}: {made.n:,} of {made.total:,} episodes can be replayed in it{more}")
@@ -158,7 +102,7 @@ def _filter(only: Sequence[str]) -> Any:
     """The filter that the options name."""
     from benchmarks.monitor.run_view import SORTS, Filter
 
-    names = [each.name for each in fields(Filter) if each.name != "page"]
+    names = [name for name in Filter.names() if name != "page"]
     given: dict[str, str] = {}
     for one in only:
         name, equal, value = one.partition("=")

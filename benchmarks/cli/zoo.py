@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from benchmarks.cli.errors import BadInput, bad_input
-from benchmarks.cli.options import Place, Words
+from benchmarks.cli.errors import BadInput, bad_input, needing
+from benchmarks.cli.options import FOLDER, Words
 from benchmarks.terminal import echo, stdout
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ DTYPES = ("float16", "bfloat16", "float32")
 """As in ``agents.zoo.packing``, which imports torch; a test compares."""
 _NAME = re.compile(r"[a-z0-9]+([.-][a-z0-9]+)*")
 _NONE = "-"
-_directory = Place(file_okay=False, path_type=Path)
 
 
 class _Zoo(click.Group):
@@ -85,14 +84,14 @@ def show(name: str) -> None:
 
 
 @zoo.command()
-@click.argument("run", type=_directory)
+@click.argument("run", type=FOLDER)
 @click.option("--name", required=True, type=Words(), help="The model's name: letters, digits, -.")
 @click.option("--title", required=True, type=Words(), help="What it does, in a few words.")
 @click.option(
     "--figures",
     "runs",
     multiple=True,
-    type=_directory,
+    type=FOLDER,
     help="A run directory of er-gym bench with this model; may be repeated.",
 )
 @click.option(
@@ -102,7 +101,7 @@ def show(name: str) -> None:
     help="A command that trains it; may be repeated.  [default: what RUN says]",
 )
 @click.option("--dtype", type=click.Choice(DTYPES), default=DTYPES[0], show_default=True)
-@click.option("--into", type=_directory, help="The folder of the models.  [default: the package's]")
+@click.option("--into", type=FOLDER, help="The folder of the models.  [default: the package's]")
 def add(
     run: Path,
     name: str,
@@ -123,21 +122,17 @@ def add(
             f"{name!r:.80} is no name for a model; give lower-case letters and digits, such as "
             "single-search"
         )
-    try:
+    with needing("packing a model", "er-gym[rl,local]"):
         from agents.zoo import packing
-    except ImportError as error:
-        raise BadInput(
-            f"{error.name or error} is not installed, and packing a model needs it: "
-            "pip install 'er-gym[rl]' for a policy, 'er-gym[local]' for a language model"
-        ) from error
     from agents.zoo.card import Card, card_text
-    from agents.zoo.index import CARD, FOLDER
+    from agents.zoo.index import CARD
+    from agents.zoo.index import FOLDER as MODELS
     from benchmarks.cli.zoo_figures import RUN, figure_of, take_over_settings
     from benchmarks.scoring.report import load_run
     from er_gym import __version__
     from er_gym.writing import write_atomic
 
-    models = into or FOLDER
+    models = into or MODELS
     with bad_input():
         reports = [load_run(path) for path in runs]
         figures = [figure_of(report, name, run) for report in reports]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hmac
 import threading
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,7 +27,7 @@ from benchmarks.monitor.places import Places
 from benchmarks.monitor.site import NothingThere, Site
 
 if TYPE_CHECKING:
-    from benchmarks.cli.vlm_options import VLMOptions
+    from benchmarks.vlm_run import VLMRun
 
 _LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
 _HEADERS = {
@@ -48,7 +48,7 @@ def make_app(
     closing: threading.Event | None = None,
     *,
     play: Path | None = None,
-    options: VLMOptions | None = None,
+    vlm_run: Callable[[str], VLMRun] | None = None,
 ) -> FastAPI:
     """The application.
 
@@ -59,11 +59,12 @@ def make_app(
             through a name that it made point here.
         closing: set when the server is to end, so that pages that wait for news let go.
         play: the directory for the runs that a person plays; None if nobody may play.
-        options: for vision-language agents that a person watches.
+        vlm_run: the run of a vision-language agent that a person watches, by its name; None for
+            one without any options.
     """
     site = Site(Places(roots if play is None else (*roots, play)))
     closing = closing or threading.Event()
-    playing = PlayPages(site, closing, play, options)
+    playing = PlayPages(site, closing, play, vlm_run)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import json
 import re
-import threading
-from collections import Counter, OrderedDict
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from sys import intern
@@ -20,7 +18,8 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from benchmarks.monitor.line_tail import LineTail
+from benchmarks.monitor.followed import Followed
+from benchmarks.monitor.line_tail import LineFollower, Lines
 from benchmarks.monitor.places import Place
 from er_gym.data.collection import TRAJECTORIES
 from er_gym.data.paper_figures import ACTION, BEGIN
@@ -34,8 +33,6 @@ _THOUGHT = re.compile(
 )
 _FORMAT = b'{"format":"er-gym/trajectory/'
 _NOT_LEARNT = b'"train":false'
-_LONGEST = 64 * 2**20
-"""A line with more bytes is damaged."""
 _MOST_TEXT = 300
 _MOST_KEPT = 16
 
@@ -70,46 +67,37 @@ class Head:
 
 
 @dataclass
-class CollectionIndex:
+class CollectionIndex(LineFollower):
     """The trajectories of a collection.
 
     Attributes:
-        folder: the collection's.
         heads: in the file's order.
         found: counts as ``er-gym data stats`` has them, those that need no words read.
         lengths: number of turns to number of trajectories.
         damaged: how many lines are no trajectory.
     """
 
-    folder: Path
+    longest = 64 * 2**20  # one with more bytes is damaged
+
     heads: list[Head] = field(default_factory=list)
     found: Statistics = field(default_factory=Statistics)
     lengths: Counter[int] = field(default_factory=Counter)
     damaged: int = 0
     _places: dict[str, int] = field(default_factory=dict)
-    _tail: LineTail = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._tail = LineTail(self.folder / TRAJECTORIES, _LONGEST)
-
-    def read(self) -> None:
-        """Read what is new. A file that was replaced is read from its beginning."""
-        for some in self._tail.read():
-            if some.anew:
-                fresh = CollectionIndex(self.folder)
-                self.__dict__.update(fresh.__dict__ | {"_tail": self._tail})
-            self.damaged += some.passed_over
-            offset = some.offset
-            for line in some.lines:
-                self._take(line, offset)
-                offset += len(line) + 1
 
     def at(self, id: str) -> Head | None:
         """The trajectory with an id; None if there is none."""
         place = self._places.get(id)
         return None if place is None else self.heads[place]
 
-    def _take(self, line: bytes, offset: int) -> None:
+    def _take(self, lines: Lines) -> None:
+        self.damaged += lines.passed_over
+        offset = lines.offset
+        for line in lines.lines:
+            self._take_line(line, offset)
+            offset += len(line) + 1
+
+    def _take_line(self, line: bytes, offset: int) -> None:
         try:
             told, turns, learnt = _searched(line) or _parsed(line)
             head = self._head(offset, told, turns, learnt)
@@ -207,27 +195,12 @@ def _shared(value: object) -> str:
     return intern(_text(value)[:_MOST_TEXT])
 
 
-class Collections:
+class Collections(Followed[CollectionIndex]):
     """The collections that were looked at last; safe for threads."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._kept: OrderedDict[str, tuple[CollectionIndex, threading.Lock]] = OrderedDict()
+        super().__init__(lambda place: CollectionIndex(place.path / TRAJECTORIES), _MOST_KEPT)
         self._counts: dict[Path, tuple[tuple[int, int, int], int]] = {}
-
-    @contextmanager
-    def use(self, place: Place) -> Iterator[CollectionIndex]:
-        """A collection for a ``with`` block, up to date."""
-        with self._lock:
-            if place.id not in self._kept:
-                self._kept[place.id] = CollectionIndex(place.path), threading.Lock()
-            self._kept.move_to_end(place.id)
-            while len(self._kept) > _MOST_KEPT:
-                self._kept.popitem(last=False)
-            index, lock = self._kept[place.id]
-        with lock:
-            index.read()
-            yield index
 
     def count(self, place: Place) -> int | None:
         """How many lines a collection has; None if there is no file (yet)."""

@@ -16,11 +16,9 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from benchmarks.monitor.charts import MOST_POINTS, Point
-from benchmarks.monitor.line_tail import LineTail
+from benchmarks.monitor.line_tail import LineFollower, Lines
 
 _JSON: TypeAdapter[Any] = TypeAdapter(Any)
-_LONGEST = 2**20
-"""A line with more bytes is passed over."""
 _MOST_NAMES = 100
 """No more figures are followed."""
 _LAST_BYTES = 2**16
@@ -73,41 +71,33 @@ class Thinned:
 
 
 @dataclass
-class CurveTail:
+class CurveTail(LineFollower):
     """The series of a log.
 
     Attributes:
-        file: the log.
         over: the name of the figure that is the others' x.
         series: by name, in the order in which they came.
         last: of each figure the last value.
         lines: how many were read.
     """
 
-    file: Path
-    over: str
+    longest = 2**20
+
+    over: str = "steps"
     series: dict[str, Thinned] = field(default_factory=dict)
     last: dict[str, float] = field(default_factory=dict)
     lines: int = 0
-    _tail: LineTail = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._tail = LineTail(self.file, _LONGEST)
-
-    def read(self) -> None:
-        """Read what has been added. A log that was replaced is read from its beginning."""
-        for some in self._tail.read():
-            if some.anew:
-                self.series, self.last, self.lines = {}, {}, 0
-            self._take(some.lines)
 
     def points(self, name: str, scale: float = 1.0) -> list[Point]:
         """The points of a figure, its values multiplied; none if it never came."""
         found = self.series[name].points() if name in self.series else []
         return [Point(x, y * scale, low * scale, high * scale) for x, y, low, high in found]
 
-    def _take(self, lines: Sequence[bytes]) -> None:
-        found = _parsed(lines)
+    def _forget(self) -> None:
+        self.series, self.last, self.lines = {}, {}, 0
+
+    def _take(self, lines: Lines) -> None:
+        found = _parsed(lines.lines)
         all_xs: list[Any] = [each.get(self.over) for each in found]
         if not _all_numbers(all_xs):
             found = [each for each in found if _is_number(each.get(self.over))]

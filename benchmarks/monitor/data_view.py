@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -11,70 +11,55 @@ from benchmarks.monitor.charts import Axis, Series, chart, points
 from benchmarks.monitor.collection_index import CollectionIndex, Head
 from benchmarks.monitor.flow import flow
 from benchmarks.monitor.language import Translator
-from benchmarks.monitor.listing import TypeFilter
+from benchmarks.monitor.listing import AddressFilter
 from er_gym.data import paper_figures as paper
 from er_gym.data.statistics import STATES, mean_and_most
 from er_gym.data.trajectory import TAG_OF_KIND, THOUGHT_KINDS, PictureRecord, Trajectory, Turn
 from er_gym.rollout.records import EpisodeRecord, StepRecord
 from er_gym.tasks.verbs import INIT
 
+SORTS: Mapping[str, Callable[[Head], Any]] = {
+    "order": lambda head: head.offset,
+    "turns": lambda head: (head.turns, head.offset),
+    "thoughts": lambda head: (head.thoughts, head.offset),
+    "refused": lambda head: (len(head.refused), head.offset),
+}
+"""What trajectories can be sorted by; ``order`` is the file's."""
+
 
 @dataclass(frozen=True)
-class DataFilter(TypeFilter):
-    """Which trajectories are shown; every field is a parameter of the address.
+class DataFilter(AddressFilter[Head]):
+    """Which trajectories of a collection are shown.
 
     Attributes:
         part, kind, language, outcome: exact values; "" for any.
         refused: a code of the critic's; "" for any.
-        text: part of the id or the instruction, whatever the case.
-        sort: ``order``, ``turns``, ``thoughts`` or ``refused``; with ``-`` before it, descending.
-        page: from 1.
     """
 
-    sorts: ClassVar[Collection[str]] = ("order", "turns", "thoughts", "refused")
+    sorts: ClassVar[Mapping[str, Callable[[Head], Any]]] = SORTS
 
     part: str = ""
     kind: str = ""
     language: str = ""
     outcome: str = ""
     refused: str = ""
-    text: str = ""
     sort: str = "order"
-    page: int = 1
 
-    def takes(self, head: Head) -> bool:
+    def takes(self, row: Head) -> bool:
         """Whether a trajectory is shown."""
-        return (
-            self.part in ("", head.part)
-            and self.kind in ("", head.kind)
-            and self.takes_type(head.task_type)
-            and self.language in ("", head.language)
-            and self.outcome in ("", outcome_of(head))
-            and (not self.refused or self.refused in head.refused)
-            and (
-                not self.text or self.text.casefold() in f"{head.id} {head.instruction}".casefold()
-            )
-        )
+        exact = {
+            "part": row.part,
+            "kind": row.kind,
+            "language": row.language,
+            "outcome": outcome_of(row),
+        }
+        matches = self.matches(row.task_type, exact, f"{row.id} {row.instruction}")
+        return matches and (not self.refused or self.refused in row.refused)
 
 
 def outcome_of(head: Head) -> str:
     """``success`` or ``failure``."""
     return "success" if head.success else "failure"
-
-
-def chosen(index: CollectionIndex, filter: DataFilter) -> list[Head]:
-    """The trajectories that a filter takes, sorted."""
-    taken = [head for head in index.heads if filter.takes(head)]
-    name = filter.sort.removeprefix("-")
-    if name == "turns":
-        taken.sort(key=lambda head: head.turns)
-    elif name == "thoughts":
-        taken.sort(key=lambda head: head.thoughts)
-    elif name == "refused":
-        taken.sort(key=lambda head: len(head.refused))
-    if filter.sort.startswith("-"):
-        taken.reverse()
-    return taken
 
 
 @dataclass(frozen=True)

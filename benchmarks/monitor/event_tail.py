@@ -6,14 +6,12 @@ import json
 import re
 from dataclasses import dataclass, field
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 from pydantic_core import from_json
 
-from benchmarks.monitor.line_tail import LineTail
+from benchmarks.monitor.line_tail import LineFollower, Lines
 from er_gym.rollout.causes import EpisodeCauses
-from er_gym.rollout.events import EVENTS
 from er_gym.rollout.outcomes import succeeded
 
 _LINE = re.compile(
@@ -22,8 +20,6 @@ _LINE = re.compile(
 )
 """How er-gym writes a step: its time, task, number, verb, type and reward; or any other line. Most
 lines are steps; to parse their thoughts, which are not shown here, would take most of the time."""
-_LONGEST = 8 * 2**20
-"""A line with more bytes is passed over: a model may say anything."""
 
 
 @dataclass(slots=True)
@@ -79,11 +75,10 @@ class EpisodeRow:
 
 
 @dataclass
-class EventTail:
+class EventTail(LineFollower):
     """The state of a run as its event stream tells it.
 
     Attributes:
-        folder: the run directory.
         rows: by episode, in the order in which they began first.
         wanted: how many episodes the run is to have; None if it does not say.
         begun: when it was started last, seconds since the epoch; 0 if unknown.
@@ -93,7 +88,8 @@ class EventTail:
         version: changes with every event that was read.
     """
 
-    folder: Path
+    longest = 8 * 2**20  # a model may say anything
+
     rows: dict[str, EpisodeRow] = field(default_factory=dict)
     wanted: int | None = None
     begun: float = 0.0
@@ -102,26 +98,16 @@ class EventTail:
     why: str = ""
     time: float = 0.0
     version: int = 0
-    _tail: LineTail = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._tail = LineTail(self.folder / EVENTS, _LONGEST)
-
-    def read(self) -> None:
-        """Read what has been added. A stream that was replaced is read from its beginning."""
-        for some in self._tail.read():
-            if some.anew:
-                self._forget()
-            self._take(some.text)
 
     def _forget(self) -> None:
-        fresh = EventTail(self.folder, version=self.version + 1)
-        self.__dict__.update(fresh.__dict__ | {"_tail": self._tail})
+        version = self.version + 1
+        super()._forget()
+        self.version = version
 
-    def _take(self, text: bytes) -> None:
+    def _take(self, lines: Lines) -> None:
         # A run may have hundreds of thousands of steps, and its first page waits for this loop.
         steps, latest, row, row_of = 0, self.time, EpisodeRow(""), None
-        for time, key, number, verb, object_type, reward, other in _LINE.findall(text):
+        for time, key, number, verb, object_type, reward, other in _LINE.findall(lines.text):
             try:
                 if other:
                     row_of = None  # the episode may begin again

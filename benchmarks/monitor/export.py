@@ -8,8 +8,9 @@
     x/episodes/0003.html        a replay
     x/pictures/0003-000.jpeg    its pictures
 
-It is made of the server's own pages (:mod:`benchmarks.monitor.offline`). Nothing of the run is in
-a script: scripts are those of ``static/``; the page's own policy forbids all others, and requests.
+It is made of the templates of the server's pages, so it shows what the server shows; what needs the
+server is left out. Nothing of the run is in a script: scripts are those of ``static/``; the page's
+own policy forbids all others, and requests.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ from dataclasses import replace as changed
 from html import escape
 from importlib.resources import files
 from pathlib import Path
-from urllib.parse import urlencode
+from typing import Any, TypeAlias
+from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from markupsafe import Markup
 
@@ -36,9 +38,8 @@ from benchmarks.monitor.episode_view import EpisodeView, StepView, picture_file,
 from benchmarks.monitor.event_tail import EpisodeRow
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.listing import Page
-from benchmarks.monitor.offline import OfflinePage, offline
 from benchmarks.monitor.pages.replays import PICTURE_KINDS, drawn_room, no_room
-from benchmarks.monitor.pages.runs import run_told
+from benchmarks.monitor.pages.runs import run_variables
 from benchmarks.monitor.places import Places
 from benchmarks.monitor.run_view import SORTS, Filter
 from benchmarks.monitor.site import Site
@@ -52,6 +53,11 @@ USUAL_EPISODES = 20
 """So many replays are put into a file unless another number is asked for."""
 _STYLES, _SCRIPTS = ("monitor.css", "charts.css"), ("export.js", "episode.js")
 _MOST_TEXT = 500
+_END_OF_TITLE = "<!-- the end of the title -->"
+"""Cannot stand in a title, in which ``<`` is escaped."""
+
+Link: TypeAlias = Callable[[str, Mapping[str, str]], "str | None"]
+"""From an address of the server, as path and parameters, to another; None if there is none."""
 
 
 class CannotExport(ValueError):
@@ -87,22 +93,32 @@ class Wanted:
 
 
 @dataclass(frozen=True)
+class OfflinePage:
+    """A page without its shell: its title and what is in the ``body``, both as HTML."""
+
+    title: str
+    body: str
+
+
+@dataclass(frozen=True)
 class Exported:
     """What was exported.
 
     Attributes:
         n: how many episodes have a replay.
         total: how many have ended.
+        map: the map of the room of a replay, as HTML.
     """
 
     n: int
     total: int
+    map: Callable[[], Markup] = Markup
 
     def row(self, row: EpisodeRow) -> str:
         """What the script needs to filter and to sort a row, as JSON."""
-        told = {name: _sortable(key(row)) for name, key in SORTS.items()}
+        values = {name: _sortable(key(row)) for name, key in SORTS.items()}
         text = f"{row.key} {row.instruction}".casefold()[:_MOST_TEXT]
-        return json.dumps({**told, "scene": row.scene, "text": text})
+        return json.dumps({**values, "scene": row.scene, "text": text})
 
 
 def export(wanted: Wanted, tell: Callable[[int, int], None] = lambda done, of: None) -> Exported:
@@ -174,16 +190,14 @@ class _Maker:
         """The run's page with all rows."""
         with self._site.runs.use(self.place) as view:
             view.count_failures(float("inf"))
-            told = run_told(view, Filter())
+            variables = run_variables(view, Filter())
             every = view.chosen(Filter())
-            told["page"] = Page(every, len(every), 1, 1)
-        told["exported"] = self.exported
-        page = self._site.page("run.html", told, self._words)
+            variables["page"] = Page(every, len(every), 1, 1)
 
         def replay(path: str, parameters: Mapping[str, str]) -> str | None:
             return self._episode_address(path, parameters, f"{EPISODES}/")
 
-        return offline(page, self._link("", replay), lambda parameters: "")
+        return self._page("run.html", {**variables, "exported": self.exported}, "", replay)
 
     def episode_page(self, key: str, picture: Callable[[int, bytes, str], str]) -> OfflinePage:
         """An episode's page.
@@ -202,16 +216,15 @@ class _Maker:
         if not contents and self.wanted.draw:
             episode, contents = self._drawn(episode)
         addresses = [picture(n, *each) if each else None for n, each in enumerate(contents)]
-        told = {
+        variables = {
             "run": self._site.summary(self.place),
             "key": key,
             "episode": episode,
             "filter": Filter(),
             "before": self.keys[at - 1] if at else "",
             "after": self.keys[at + 1] if at + 1 < len(self.keys) else "",
-            "exported": self.exported,
+            "exported": changed(self.exported, map=lambda: self._map(episode)),
         }
-        page = self._site.page("episode.html", told, self._words)
 
         def shown(path: str, parameters: Mapping[str, str]) -> str | None:
             if path.endswith("/picture"):
@@ -219,21 +232,33 @@ class _Maker:
                 return addresses[int(n)] if n.isdigit() and int(n) < len(addresses) else None
             return self._episode_address(path, parameters, "")
 
-        return offline(page, self._link("../", shown), lambda _: self._map(episode))
+        return self._page("episode.html", variables, "../", shown)
 
-    def _link(
-        self, up: str, other: Callable[[str, Mapping[str, str]], str | None]
-    ) -> Callable[[str, Mapping[str, str]], str | None]:
-        """Where addresses lead, seen from the list (``up`` is "") or from an episode."""
-        home = f"/runs/{self.place.id}"
+    def _page(
+        self, template: str, variables: Mapping[str, Any], up: str, other: Link
+    ) -> OfflinePage:
+        """A page of the server for a disk.
 
-        def link(path: str, parameters: Mapping[str, str]) -> str | None:
-            if path in (home, "/"):
-                query = f"?{urlencode(parameters)}" if parameters or self.wanted.is_file else ""
-                return query if self.wanted.is_file else f"{up}{INDEX}{query}"
-            return other(path, parameters)
+        Args:
+            template: the page's.
+            variables: its variables.
+            up: from the page to the list's folder.
+            other: where addresses lead beside those of the list.
+        """
 
-        return link
+        def link(address: str) -> str | None:
+            parts = urlsplit(address)
+            parameters = dict(parse_qsl(parts.query))
+            if parts.path not in (f"/runs/{self.place.id}", "/"):
+                return other(parts.path, parameters)
+            query = f"?{urlencode(parameters)}" if parameters or self.wanted.is_file else ""
+            return query if self.wanted.is_file else f"{up}{INDEX}{query}"
+
+        variables = {**variables, "end_of_title": Markup(_END_OF_TITLE)}
+        title, _, body = self._site.page(template, variables, self._words, link=link).partition(
+            _END_OF_TITLE
+        )
+        return OfflinePage(title.strip(), body)
 
     def _episode_address(self, path: str, parameters: Mapping[str, str], folder: str) -> str | None:
         number = self._numbers.get(parameters.get("key", ""))
@@ -266,12 +291,11 @@ class _Maker:
         ]
         return changed(episode, steps=steps, pictures=records), contents
 
-    def _map(self, episode: EpisodeView) -> str:
+    def _map(self, episode: EpisodeView) -> Markup:
         try:
-            drawn = drawn_room(self._worlds, self._run.manifest, episode.record, self._words)
+            return drawn_room(self._worlds, self._run.manifest, episode.record, self._words)
         except CannotReplay as error:
-            drawn = no_room(error, self._words)
-        return str(drawn)
+            return no_room(error, self._words)
 
 
 def _write_file(maker: _Maker, tell: Callable[[int, int], None]) -> None:

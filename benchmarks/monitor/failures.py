@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import Final, Literal, TypeAlias
+from typing import Final, Literal, TypeAlias, get_args
 
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.envs.info import REPEATED
@@ -15,10 +15,7 @@ Failure: TypeAlias = Literal[
     "crashed", "gave up", "unusable replies", "wrong order", "wrong object", "never found",
     "repeated", "repeated action", "out of steps", "ended too early", "ended otherwise",
 ]  # fmt: skip
-FAILURES: tuple[Failure, ...] = (
-    "crashed", "gave up", "unusable replies", "wrong order", "wrong object", "never found",
-    "repeated", "repeated action", "out of steps", "ended too early", "ended otherwise",
-)  # fmt: skip
+FAILURES: tuple[Failure, ...] = get_args(Failure)
 """The kinds, in the order in which they are looked for."""
 _NO_ACTION: Final = "no known action"
 _BY_END: Mapping[str, Failure] = {

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
 _CHUNK = 2**20
 
@@ -81,3 +83,36 @@ class LineTail:
         self._rest = b"" if self._too_long else text[end:]
         skipped = first if passed_over else 0
         return Lines(begin + skipped, text[skipped:end], int(passed_over))
+
+
+@dataclass
+class LineFollower(ABC):
+    """Keeps what the lines of a growing file tell.
+
+    Attributes:
+        file: it need not be there yet.
+        longest: a line with more bytes is passed over.
+    """
+
+    longest: ClassVar[int]
+
+    file: Path
+    _tail: LineTail = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self._tail = LineTail(self.file, self.longest)
+
+    def read(self) -> None:
+        """Read what has been added. A file that was replaced is read from its beginning."""
+        for lines in self._tail.read():
+            if lines.anew:
+                self._forget()
+            self._take(lines)
+
+    def _forget(self) -> None:
+        """Become as new: the file is another one, or the first."""
+        vars(self).update(vars(type(self)(self.file)) | {"_tail": self._tail})
+
+    @abstractmethod
+    def _take(self, lines: Lines) -> None:
+        """Take some lines that have become whole."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 from urllib.parse import urlencode
 
 from er_gym.tasks.types import canonical_names
@@ -15,24 +15,38 @@ _MOST_TEXT = 300
 _MOST_PAGES = 10**6
 
 Row = TypeVar("Row")
-_Filter = TypeVar("_Filter", bound="AddressFilter")
+_Filter = TypeVar("_Filter", bound="AddressFilter[Any]")
+_Class: TypeAlias = type[_Filter]
+"""Under another name, since a filter has a field ``type``."""
 
 
 @dataclass(frozen=True)
-class AddressFilter:
-    """Which rows of a list are shown, and in which order.
-
-    Each field of a subclass is a parameter of the address: a text, ``""`` for any; or ``sort``, the
-    name of an order, with ``-`` before it if it descends; or ``page``, from 1.
+class AddressFilter(Generic[Row]):
+    """Which rows of a list are shown, and in which order; each field is a parameter of the address.
 
     Attributes:
-        sorts: the names of the orders.
+        sorts: what rows are sorted by, for each name of an order.
+        type: any name of a type of task or of a group, which stands for its types
+            (:func:`er_gym.tasks.types.types_named`); "" for any.
+        text: part of what a row says, whatever the case.
+        sort: one of ``sorts``; with ``-`` before it, descending.
+        page: from 1.
     """
 
-    sorts: ClassVar[Collection[str]] = ()
+    sorts: ClassVar[Mapping[str, Callable[[Any], Any]]] = {}
+
+    type: str = ""
+    text: str = ""
+    sort: str = ""
+    page: int = 1
 
     @classmethod
-    def of(cls: type[_Filter], parameters: Mapping[str, str]) -> _Filter:
+    def names(cls) -> list[str]:
+        """The parameters in the order of an address: those of all lists at its end."""
+        return sorted((each.name for each in fields(cls)), key=("text", "sort", "page").count)
+
+    @classmethod
+    def of(cls: _Class[_Filter], parameters: Mapping[str, str]) -> _Filter:
         """From an address; what makes no sense there is passed over."""
         texts = {each.name: parameters.get(each.name, "") for each in fields(cls)}
         if texts["sort"].removeprefix("-") not in cls.sorts:
@@ -42,22 +56,39 @@ class AddressFilter:
 
     def query(self, **changes: Any) -> str:
         """The parameters of an address, with some changed or added; the page begins again."""
-        told = {each.name: getattr(self, each.name) for each in fields(self)}
+        told = {name: getattr(self, name) for name in self.names()}
         told |= {"page": 1, **changes}
         defaults = {each.name: each.default for each in fields(self)}
         return urlencode({k: str(value) for k, value in told.items() if value != defaults.get(k)})
 
+    def takes(self, row: Row) -> bool:
+        """Whether a row is shown."""
+        raise NotImplementedError
 
-@dataclass(frozen=True)
-class TypeFilter(AddressFilter):
-    """A filter by the type of task.
+    def chosen(self, rows: Iterable[Row]) -> list[Row]:
+        """The rows that are shown, sorted."""
+        taken = [row for row in rows if self.takes(row)]
+        key = self.sorts[self.sort.removeprefix("-")]
+        taken.sort(key=key, reverse=self.sort.startswith("-"))
+        return taken
 
-    Attributes:
-        type: any name of a type or of a group, which stands for its types
-            (:func:`er_gym.tasks.types.types_named`); "" for any.
-    """
+    def matches(self, type: str, exact: Mapping[str, str], said: str) -> bool:
+        """Whether a row is shown as far as these tell.
 
-    type: str = ""
+        Args:
+            type: the row's type of task, by its name in task files.
+            exact: by the name of a field, what the row must have unless that is "".
+            said: what the row says.
+        """
+        return (
+            self.takes_type(type)
+            and all(getattr(self, name) in ("", value) for name, value in exact.items())
+            and (not self.text or self.text.casefold() in said.casefold())
+        )
+
+    def takes_type(self, name: str) -> bool:
+        """Whether a type of task is shown, by its name in task files."""
+        return not self.type or name in self._types
 
     @cached_property
     def _types(self) -> frozenset[str]:
@@ -65,10 +96,6 @@ class TypeFilter(AddressFilter):
             return frozenset((self.type, *canonical_names([self.type])))
         except ValueError:  # of a package that is not installed here, or unknown
             return frozenset([self.type])
-
-    def takes_type(self, name: str) -> bool:
-        """Whether a type is shown, by its name in task files."""
-        return not self.type or name in self._types
 
     def unknown_type(self, present: Collection[str]) -> str:
         """Why the name of the type means nothing, in a line; "" if it means something.

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from benchmarks.monitor.event_tail import EpisodeRow, EventTail
 from benchmarks.monitor.failure_counts import FailureCounts
-from benchmarks.monitor.listing import TypeFilter
+from benchmarks.monitor.followed import Followed
+from benchmarks.monitor.listing import AddressFilter
 from benchmarks.monitor.places import Place
 from benchmarks.monitor.record_rows import RecordRows
 from benchmarks.monitor.spending_tail import SpendingTail
 from benchmarks.scoring.metrics import success_rate
 from er_gym.rollout.causes import count_causes
-from er_gym.rollout.events import Cost
+from er_gym.rollout.events import EVENTS, Cost
 from er_gym.rollout.records import task_of_key
-from er_gym.rollout.run_directory import Manifest, RunDirectory, RunDirectoryError
+from er_gym.rollout.run_directory import SPENDING, Manifest, RunDirectory, RunDirectoryError
 from er_gym.tasks.types import task_type
 
 _SILENT_SECONDS = 120.0
@@ -49,37 +49,27 @@ def _room_number(scene: str) -> tuple[int, str]:
 
 
 @dataclass(frozen=True)
-class Filter(TypeFilter):
-    """Which rows are shown; every field is a parameter of the address.
+class Filter(AddressFilter[EpisodeRow]):
+    """Which episodes of a run are shown.
 
     Attributes:
         scene, outcome, reason: exact values; "" for any.
         steps: ``5``, ``5-10``, ``-10`` or ``5-``; "" for any.
-        text: part of the name or the instruction, whatever the case.
-        sort: a column of :data:`SORTS`; with ``-`` before it, descending.
-        page: from 1.
     """
 
-    sorts: ClassVar[Collection[str]] = SORTS
+    sorts: ClassVar[Mapping[str, Callable[[EpisodeRow], Any]]] = SORTS
 
     scene: str = ""
     outcome: str = ""
     reason: str = ""
     steps: str = ""
-    text: str = ""
     sort: str = "-ended"
-    page: int = 1
 
     def takes(self, row: EpisodeRow) -> bool:
         """Whether a row is shown."""
-        return (
-            self.takes_type(row.task_type)
-            and self.scene in ("", row.scene)
-            and self.outcome in ("", row.outcome)
-            and self.reason in ("", row.end_reason)
-            and _within(row.steps, self.steps)
-            and (not self.text or self.text.casefold() in f"{row.key} {row.instruction}".casefold())
-        )
+        exact = {"scene": row.scene, "outcome": row.outcome, "reason": row.end_reason}
+        said = f"{row.key} {row.instruction}"
+        return self.matches(row.task_type, exact, said) and _within(row.steps, self.steps)
 
 
 def _within(number: int, bounds: str) -> bool:
@@ -188,11 +178,11 @@ class RunView:
     _problem: str = ""
 
     def __post_init__(self) -> None:
-        self._tail = EventTail(self.place.path)
+        self._tail = EventTail(self.place.path / EVENTS)
         self._records = RecordRows(self.place.path)
-        self._spending = SpendingTail(self.place.path)
+        self._spending = SpendingTail(self.place.path / SPENDING)
 
-    def refresh(self) -> None:
+    def read(self) -> None:
         """Read what is new."""
         if self._manifest is None:
             try:
@@ -259,9 +249,7 @@ class RunView:
 
     def chosen(self, filter: Filter) -> list[EpisodeRow]:
         """The rows that a filter takes, sorted."""
-        rows = [row for row in self._rows.values() if filter.takes(row)]
-        rows.sort(key=SORTS[filter.sort.removeprefix("-")], reverse=filter.sort.startswith("-"))
-        return rows
+        return filter.chosen(self._rows.values())
 
     def tallies(self) -> tuple[list[Tally], list[Tally]]:
         """Success by group and by task type, in the order of the paper's table."""
@@ -317,34 +305,6 @@ def _share(row: EpisodeRow, until: float) -> float:
     return (end - max(begin, until - _RECENT_SECONDS)) / (end - begin)
 
 
-class RunViews:
-    """All runs that have been looked at; safe for threads."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._views: dict[str, tuple[RunView, threading.Lock]] = {}
-
-    def use(self, place: Place) -> _InUse:
-        """A run for a ``with`` block, up to date."""
-        with self._lock:
-            if place.id not in self._views:
-                self._views[place.id] = RunView(place), threading.Lock()
-            return _InUse(*self._views[place.id])
-
-
-@dataclass(frozen=True)
-class _InUse:
-    view: RunView
-    lock: threading.Lock
-
-    def __enter__(self) -> RunView:
-        self.lock.acquire()
-        try:
-            self.view.refresh()
-        except BaseException:
-            self.lock.release()
-            raise
-        return self.view
-
-    def __exit__(self, *_: object) -> None:
-        self.lock.release()
+def run_views() -> Followed[RunView]:
+    """All runs that have been looked at."""
+    return Followed(RunView)

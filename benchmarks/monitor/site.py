@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from copy import deepcopy
 from typing import Any, TypeAlias
 from urllib.parse import urlencode
@@ -11,6 +12,7 @@ from urllib.parse import urlencode
 from fastapi import Request, Response
 from fastapi.responses import HTMLResponse
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 from benchmarks.monitor import formats, svg
 from benchmarks.monitor.episode_view import MOST_TEXT
@@ -19,7 +21,7 @@ from benchmarks.monitor.failure_counts import FailureCounts
 from benchmarks.monitor.growth import growth
 from benchmarks.monitor.language import Translator, chosen_language
 from benchmarks.monitor.places import Kind, Place, Places
-from benchmarks.monitor.run_view import RunSummary, RunViews
+from benchmarks.monitor.run_view import RunSummary, run_views
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 
@@ -38,6 +40,15 @@ class NothingThere(Exception):
     """There is nothing at this address."""
 
 
+@contextmanager
+def or_nothing() -> Iterator[None]:
+    """Within, what cannot be read is not there: raises :class:`NothingThere`."""
+    try:
+        yield
+    except (ValueError, OSError):
+        raise NothingThere from None
+
+
 class Site:
     """The directories, read while they grow, and pages made from templates.
 
@@ -48,7 +59,7 @@ class Site:
 
     def __init__(self, places: Places) -> None:
         self.places = places
-        self.runs = RunViews()
+        self.runs = run_views()
         self._templates = Environment(
             loader=PackageLoader("benchmarks.monitor", "templates"),
             autoescape=True,
@@ -60,24 +71,45 @@ class Site:
         self._templates.filters.update(formats.FILTERS)
 
     def show(
-        self, request: Request, template: str, told: Mapping[str, Any], status: int = 200
+        self, request: Request, template: str, variables: Mapping[str, Any], status: int = 200
     ) -> Response:
         """A page in the reader's language.
 
         Args:
             request: asks for it.
             template: its file.
-            told: the template's variables; ``live`` is what the page wants news of.
+            variables: the template's variables; ``live`` is what the page wants news of.
             status: of the answer.
         """
         here = request.url.path + (f"?{request.url.query}" if request.url.query else "")
-        return HTMLResponse(self.page(template, told, self.translator(request), here), status)
+        return HTMLResponse(self.page(template, variables, self.translator(request), here), status)
 
-    def page(self, template: str, told: Mapping[str, Any], t: Translator, here: str = "") -> str:
-        """A page in a language, as HTML; ``here`` is its address."""
-        shared = {"live": "", "scripts": (), "at": "", "exported": None}
+    def page(
+        self,
+        template: str,
+        variables: Mapping[str, Any],
+        t: Translator,
+        here: str = "",
+        link: Callable[[str], str | None] = lambda address: address,
+    ) -> str:
+        """A page in a language, as HTML.
+
+        Args:
+            template: its file.
+            variables: the template's variables; ``exported`` if there will be no server.
+            t: the words.
+            here: its address.
+            link: from an address of the server to where it leads from this page; None for nowhere.
+        """
+
+        def to(address: str, attribute: str = "href") -> Markup:
+            """An attribute that names an address; none where it leads nowhere."""
+            there = link(address)
+            return Markup("") if there is None else Markup(' {}="{}"').format(attribute, there)
+
+        shared = {"live": "", "scripts": (), "at": "", "exported": None, "to": to}
         return self._templates.get_template(template).render(
-            {**shared, **told, "t": t, "here": here}
+            {**shared, **variables, "t": t, "here": here}
         )
 
     def translator(self, request: Request) -> Translator:
@@ -141,8 +173,6 @@ class Site:
         Raises:
             NothingThere: there is none.
         """
-        try:
+        with or_nothing():
             run = RunDirectory.open(self.place(id, "run").path)
             return run.episode(key), run.manifest
-        except (ValueError, OSError):
-            raise NothingThere from None

@@ -5,8 +5,6 @@ Colours are names of CSS variables of ``static/monitor.css``, which has them for
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from markupsafe import Markup
 
 
@@ -40,17 +38,3 @@ def difference_bar(difference: float, low: float, high: float) -> Markup:
         100 * low,
         max(0.8, 100 * (high - low)),
     )
-
-
-def share_bar(parts: Sequence[tuple[str, float]]) -> Markup:
-    """Parts of a whole side by side; each has the name of a CSS class and a fraction."""
-    left, drawn = 0.0, Markup("")
-    for name, share in parts:
-        drawn += Markup('<rect class="{}" x="{:.2f}" width="{:.2f}" height="10"/>').format(
-            name, 100 * left, 100 * share
-        )
-        left += share
-    return Markup(
-        '<svg class="shares" viewBox="0 0 100 10" preserveAspectRatio="none" aria-hidden="true">'
-        '<rect class="rail" width="100" height="10"/>{}</svg>'
-    ).format(drawn)

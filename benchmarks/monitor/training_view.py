@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import threading
 import time
-from collections import OrderedDict
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +12,7 @@ import yaml
 
 from benchmarks.monitor.charts import Axis, Series, chart
 from benchmarks.monitor.curve_tail import CurveTail, last_line
+from benchmarks.monitor.followed import Followed
 from benchmarks.monitor.growth import changed, in_use
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.places import Place
@@ -190,24 +188,8 @@ def finetuning_charts(tail: CurveTail, t: Translator) -> list[tuple[str, Any]]:
     return [(title, picture) for title, picture in drawn if picture]
 
 
-class Curves:
-    """The curves of the runs that were looked at last; safe for threads."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._kept: OrderedDict[str, tuple[CurveTail, threading.Lock]] = OrderedDict()
-
-    @contextmanager
-    def use(self, place: Place) -> Iterator[CurveTail]:
-        """A run's curves for a ``with`` block, up to date."""
-        with self._lock:
-            if place.id not in self._kept:
-                tail = CurveTail(place.path / _LOG[place.kind], _OVER[place.kind])
-                self._kept[place.id] = tail, threading.Lock()
-            self._kept.move_to_end(place.id)
-            while len(self._kept) > _MOST_KEPT:
-                self._kept.popitem(last=False)
-            tail, lock = self._kept[place.id]
-        with lock:
-            tail.read()
-            yield tail
+def curves() -> Followed[CurveTail]:
+    """The curves of the runs that were looked at last."""
+    return Followed(
+        lambda place: CurveTail(place.path / _LOG[place.kind], _OVER[place.kind]), _MOST_KEPT
+    )

@@ -49,7 +49,7 @@ def told(run: Path) -> tuple[int, float, float | None, float | None]:
 def shown(run: Path) -> tuple[int, float | None, float | None, float | None]:
     """The same, as the monitor has them."""
     view = RunView(Places([run]).of_kind("run")[0])
-    view.refresh()
+    view.read()
     tally = view.summary().success
     return tally.n, tally.rate, tally.low, tally.high
 
@@ -161,7 +161,7 @@ def test_a_comparison_counts_as_the_reports_do(run: Path, er_gym: Command) -> No
     rows = []
     for each in (run, other):
         view = RunView(Places([each]).of_kind("run")[0])
-        view.refresh()
+        view.read()
         rows.append(view.rows)
     found = difference("", pairs_of(*rows))
     reports: list[RunReport] = [load_run(each) for each in (run, other)]

@@ -98,7 +98,7 @@ BAD_OPTIONS = {
     "agent": (["--agent", "nobody"], ["'nobody'", "oracle", "random"]),
     "backend": (["--backend", "unreal"], ["'unreal'", "embedded", "unity"]),
     "instances": (["--instances", "any"], ["'any'", "target", "explore"]),
-    "both sources": (["--suite", "mini"], ["either --suite", "--tasks-file"]),
+    "both sources": (["--suite", "mini"], ["give --suite or --tasks-file, not both"]),
     "task": (["--task-ids", "paper-1,paper-99"], ["'paper-99'", "paper-0"]),
     "shard": (["--shard", "9/8"], ["'9/8'", "2/8"]),
     "limit": (["--limit", "0"], ["--limit", "er-gym bench --help"]),

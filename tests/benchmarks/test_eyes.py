@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from benchmarks import eyes
 from benchmarks.cli.main import cli
+from benchmarks.eyes import examine as eyes
+from benchmarks.eyes.__main__ import main
 from er_gym.data.dialects import load_dialect
 from er_gym.data.frame_chat import QUESTIONS, Question, words_for_frames
 
@@ -68,7 +69,7 @@ def test_a_model_is_measured_from_nothing_to_the_table(tmp_path: Path) -> None:
         "--out", base)  # fmt: skip
     run("finetune", "--config", "tiny", "--model", base, "--data", frames, "--out", tuned,
         "--set", "data.dialect=sight", "--set", "training.epochs=1")  # fmt: skip
-    result = CliRunner().invoke(eyes.main, [str(tuned), str(frames), "--limit", "3", "--md"])
+    result = CliRunner().invoke(main, [str(tuned), str(frames), "--limit", "3", "--md"])
     assert result.exit_code == 0, result.output
     assert "What is seen in 3 frames" in result.output
     lines = [line.strip("| ").split("|") for line in result.stdout.splitlines() if "|" in line]

@@ -8,7 +8,7 @@ import pytest
 
 from agents.expert.recipe import Part
 from agents.rl.config import EnvConfig, Phase
-from benchmarks.cli.collect_choice import chosen_tasks
+from benchmarks.cli.suites import chosen_tasks
 from benchmarks.ladder.settings import LadderSettings
 from benchmarks.plan.checks import check_tasks
 from er_gym.envs.embodied_env import EmbodiedEnv

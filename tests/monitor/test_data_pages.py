@@ -16,7 +16,7 @@ from benchmarks.monitor.collection_index import CollectionIndex
 from benchmarks.monitor.flow import flow
 from benchmarks.monitor.growth import growth
 from benchmarks.monitor.places import Places
-from er_gym.data.collection import Collection
+from er_gym.data.collection import TRAJECTORIES, Collection
 from er_gym.data.statistics import statistics
 from er_gym.data.trajectory import Trajectory
 from er_gym.tasks.types import canonical_names
@@ -74,7 +74,7 @@ def same(index: CollectionIndex, collection: Collection) -> None:
 
 
 def test_the_index_counts_as_the_statistics_do(collection):
-    index = CollectionIndex(collection.path)
+    index = CollectionIndex(collection.path / TRAJECTORIES)
     index.read()
     every = list(collection.trajectories())
     assert [head.id for head in index.heads] == [each.id for each in every]
@@ -91,7 +91,7 @@ def test_other_layouts_are_read_and_damage_is_counted(collection, tmp_path):
     spaced = [json.dumps(json.loads(line), indent=None) for line in lines]  # spaces after colons
     file = other.path / "trajectories.jsonl"
     file.write_text("\n".join(spaced[:3]) + "\n")
-    index = CollectionIndex(other.path)
+    index = CollectionIndex(other.path / TRAJECTORIES)
     index.read()
     assert len(index.heads) == 3
     same(index, other)
@@ -110,7 +110,7 @@ def test_texts_that_look_like_fields_are_texts(collection, tmp_path):
     first = next(collection.trajectories())
     trap = 'a"purpose":"b,"verb":"c],"success":false,{"kind":"planning","text":"x\\'
     other.write([with_thought(first, text=trap).model_copy(update={"instruction": trap})])
-    index = CollectionIndex(other.path)
+    index = CollectionIndex(other.path / TRAJECTORIES)
     index.read()
     assert index.heads[0].success is first.success
     same(index, other)

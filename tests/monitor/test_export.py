@@ -14,7 +14,6 @@ from typing import Any
 import pytest
 
 from benchmarks.cli import main as cli
-from benchmarks.monitor.offline import offline
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.tasks.types import canonical_names
 
@@ -183,23 +182,21 @@ def test_what_a_model_says_stays_text(runs, tmp_path):
     assert "alert(1)" in html.unescape(text)
 
 
-def test_what_needs_the_server_goes():
-    page = (
-        "<html><head><title>a &lt; b</title><script src=/static/x.js></script></head>"
-        '<body data-live="x"><div data-online>gone <img src="/x"><b>too</b></div>'
-        '<a href="/runs/1?key=a%26b">in</a><a href="/else">out</a>&amp;<svg viewBox="0 0 1 1"/>'
-        '<div class="map" data-map="/map?key=k"></div></body></html>'
-    )
-    found = offline(
-        page,
-        lambda path, told: f"?{told['key']}" if path == "/runs/1" else None,
-        lambda told: f"<i>{told['key']}</i>",
-    )
-    assert found.title == "a &lt; b"
-    assert found.body == (
-        '<a href="?a&amp;b">in</a><a>out</a>&amp;<svg viewBox="0 0 1 1"/>'
-        '<div class="map" data-map=""><i>k</i></div>'
-    )
+def test_what_needs_the_server_goes(runs, tmp_path, visit):
+    out = tmp_path / "x"
+    assert export(runs / "random", "--out", out, "--episodes", 1) == 0
+    files = (out / "index.html", out / "episodes" / "0001.html")
+    exported = "".join(file.read_text(encoding="utf-8") for file in files)
+    browser = visit(runs / "random")
+    home = Seen(browser.get("/").text)
+    run = next(address for address in home.addresses() if address.startswith("/runs/"))
+    listed = browser.get(run).text
+    episode = next(each for each in Seen(listed).addresses() if "/episode?" in each)
+    served = listed + browser.get(episode).text
+    for needs_the_server in ('class="menu"', 'class="language"', " download ", "data-draw>"):
+        assert needs_the_server in served
+        assert needs_the_server not in exported
+    assert 'data-map=""><svg class="room"' in exported, "the map is in the page, not fetched"
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs the browser: apt-get install chromium")

@@ -29,7 +29,7 @@ from benchmarks.harness.processes import end_group
 _LONGEST = 1 << 17
 _IMPORTED = (
     "benchmarks.cli.main",
-    "benchmarks.cli.vlm_run",
+    "benchmarks.vlm_run",
     "benchmarks.scoring.report",
     "benchmarks.scoring.tables",
     "er_gym.envs.embodied_env",

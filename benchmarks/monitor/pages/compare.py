@@ -11,7 +11,7 @@ from benchmarks.monitor.episode_view import EpisodeView, view_of
 from benchmarks.monitor.failures import FAILURES
 from benchmarks.monitor.listing import page_number, page_of
 from benchmarks.monitor.places import Place
-from benchmarks.monitor.site import NothingThere, Routes, Site
+from benchmarks.monitor.site import NothingThere, Routes, Site, or_nothing
 from er_gym.rollout.run_directory import RunDirectory
 
 MOST_RUNS = 12
@@ -67,7 +67,7 @@ class ComparePages:
         ]
         flipped.sort(key=lambda pair: (CHANGES.index(pair.change), pair.key))
         counts = [self._site.failures(place) for place in places]
-        told = {
+        variables = {
             "runs": [summary for summary, _ in runs],
             "failures": [
                 (kind, [counted.number(kind) for counted in counts])
@@ -86,7 +86,7 @@ class ComparePages:
             "page": page_of(flipped, page_number(request.query_params)),
             "live": ",".join(asked),
         }
-        return self._site.show(request, "compare.html", told)
+        return self._site.show(request, "compare.html", variables)
 
     def episodes(self, request: Request, key: str = "") -> Response:
         """Two episodes of a task, step by step."""
@@ -94,13 +94,11 @@ class ComparePages:
         if len(asked) != 2:
             raise NothingThere
         places = [self._site.place(id, "run") for id in asked]
-        try:
+        with or_nothing():
             runs = [RunDirectory.open(place.path) for place in places]
             views = [view_of(run, key) for run in runs]
-        except (ValueError, OSError):
-            raise NothingThere from None
         parts_at = _parts_at(*views)
-        told = {
+        variables = {
             "key": key,
             "asked": asked,
             "sides": [
@@ -110,7 +108,7 @@ class ComparePages:
             "parts_at": parts_at,
             "scripts": ("episode.js",),
         }
-        return self._site.show(request, "compare_episode.html", told)
+        return self._site.show(request, "compare_episode.html", variables)
 
 
 def _parts_at(one: EpisodeView, other: EpisodeView) -> int:

@@ -10,7 +10,6 @@ from fastapi import Request, Response
 from benchmarks.monitor.collection_index import Collections
 from benchmarks.monitor.data_view import (
     DataFilter,
-    chosen,
     outcome_of,
     overview,
     record_of,
@@ -22,7 +21,7 @@ from benchmarks.monitor.listing import neighbours, page_of
 from benchmarks.monitor.pages.replays import ReplayPages
 from benchmarks.monitor.places import Place
 from benchmarks.monitor.run_view import RunSummary
-from benchmarks.monitor.site import NothingThere, Routes, Site
+from benchmarks.monitor.site import NothingThere, Routes, Site, or_nothing
 from benchmarks.monitor.world import CannotReplay
 from er_gym.data.collection import PARTS, Collection, CollectionManifest
 from er_gym.data.line_index import trajectory_at
@@ -72,19 +71,19 @@ class DataPages(ReplayPages):
         """All collections."""
         rows = [self._row(place) for place in self._site.places.of_kind("collection")]
         rows.sort(key=lambda row: (row.state != "running", row.place.name))
-        told = {"rows": rows, "roots": self._site.places.roots, "live": "*", "at": "data"}
-        return self._site.show(request, "data.html", told)
+        variables = {"rows": rows, "roots": self._site.places.roots, "live": "*", "at": "data"}
+        return self._site.show(request, "data.html", variables)
 
     def collection(self, request: Request, id: str) -> Response:
         """A collection."""
         place = self._site.place(id, "collection")
         filter = DataFilter.of(request.query_params)
         with self._collections.use(place) as index:
-            taken = chosen(index, filter)
-            told = overview(index, self._site.translator(request))
-            told |= {"total": len(index.heads), "found": index.found, "damaged": index.damaged}
-            told["unknown"] = filter.unknown_type(index.found.task_types)
-        told |= {
+            taken = filter.chosen(index.heads)
+            variables = overview(index, self._site.translator(request))
+            variables |= {"total": len(index.heads), "found": index.found, "damaged": index.damaged}
+            variables["unknown"] = filter.unknown_type(index.found.task_types)
+        variables |= {
             "row": self._row(place),
             "filter": filter,
             "page": page_of(taken, filter.page),
@@ -93,7 +92,7 @@ class DataPages(ReplayPages):
             "live": id,
             "at": "data",
         }
-        return self._site.show(request, "collection.html", told)
+        return self._site.show(request, "collection.html", variables)
 
     def trajectory(self, request: Request, id: str, key: str = "") -> Response:
         """A trajectory, turn by turn."""
@@ -101,10 +100,10 @@ class DataPages(ReplayPages):
         filter = DataFilter.of(request.query_params)
         trajectory = self._trajectory(place, key)
         with self._collections.use(place) as index:
-            ids = [head.id for head in chosen(index, filter)]
+            ids = [head.id for head in filter.chosen(index.heads)]
         before, after = neighbours(ids, key)
         turns, pictures = turns_of(trajectory)
-        told = {
+        variables = {
             "place": place,
             "key": key,
             "trajectory": trajectory,
@@ -116,7 +115,7 @@ class DataPages(ReplayPages):
             "scripts": ("episode.js",),
             "at": "data",
         }
-        return self._site.show(request, "trajectory.html", told)
+        return self._site.show(request, "trajectory.html", variables)
 
     def _picture(self, id: str, key: str, n: int) -> Path | None:
         place = self._site.place(id, "collection")
@@ -128,10 +127,8 @@ class DataPages(ReplayPages):
             head = index.at(key)
         if head is None:
             raise NothingThere
-        try:
+        with or_nothing():
             return trajectory_at(Collection.open(place.path), head.offset)
-        except (ValueError, OSError):
-            raise NothingThere from None
 
     def _played(self, id: str, key: str) -> tuple[Manifest, EpisodeRecord]:
         place = self._site.place(id, "collection")

@@ -11,7 +11,7 @@ from benchmarks.monitor.episode_view import picture_file, view_of
 from benchmarks.monitor.listing import neighbours
 from benchmarks.monitor.pages.replays import ReplayPages
 from benchmarks.monitor.run_view import Filter
-from benchmarks.monitor.site import NothingThere, Routes, Site
+from benchmarks.monitor.site import Routes, Site, or_nothing
 from benchmarks.monitor.video import as_webp, film
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import Manifest, RunDirectory
@@ -39,14 +39,12 @@ class EpisodePages(ReplayPages):
         """An episode."""
         place = self._site.place(id, "run")
         chosen = Filter.of(request.query_params)
-        try:
+        with or_nothing():
             episode = view_of(RunDirectory.open(place.path), key)
-        except (ValueError, OSError):
-            raise NothingThere from None
         with self._site.runs.use(place) as view:
             before, after = neighbours([row.key for row in view.chosen(chosen)], key)
             summary = view.summary()
-        told = {
+        variables = {
             "run": summary,
             "key": key,
             "episode": episode,
@@ -55,7 +53,7 @@ class EpisodePages(ReplayPages):
             "after": after,
             "scripts": ("episode.js",),
         }
-        return self._site.show(request, "episode.html", told)
+        return self._site.show(request, "episode.html", variables)
 
     def _played(self, id: str, key: str) -> tuple[Manifest, EpisodeRecord]:
         record, manifest = self._site.record(id, key)
@@ -63,19 +61,14 @@ class EpisodePages(ReplayPages):
 
     def _picture(self, id: str, key: str, n: int) -> Path | None:
         place = self._site.place(id, "run")
-        try:
+        with or_nothing():
             pictures = view_of(RunDirectory.open(place.path), key).pictures
-        except (ValueError, OSError):
-            raise NothingThere from None
         return picture_file(place.path, pictures[n]) if 0 <= n < len(pictures) else None
 
     def video(self, id: str, key: str = "") -> Response:
         """An episode as an animated WebP, to keep."""
-        try:
+        with or_nothing(), self._filming:  # one at a time: it is the costliest page
             run = RunDirectory.open(self._site.place(id, "run").path)
-            with self._filming:  # one at a time: it is the costliest page
-                data = as_webp(film(run, key, self._worlds))
-        except (ValueError, OSError):
-            raise NothingThere from None
+            data = as_webp(film(run, key, self._worlds))
         named = f'attachment; filename="{file_stem(key)}.webp"'
         return Response(data, media_type="image/webp", headers={"Content-Disposition": named})

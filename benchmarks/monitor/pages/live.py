@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
 import threading
-from collections.abc import AsyncIterator
+from functools import partial
 
 from fastapi import Request, Response
-from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
+from benchmarks.monitor.news import news
 from benchmarks.monitor.site import Routes, Site
 
 _LOOK_SECONDS = 0.7
 """How often a page's directories are looked at while a browser waits for news."""
-_BEAT_SECONDS = 15.0
-"""A line is sent at least so often, so that both sides notice a lost connection."""
 
 
 class LivePages:
@@ -35,25 +32,9 @@ class LivePages:
 
     async def live(self, request: Request, of: str = "*") -> Response:
         """News of a directory, of some with commas between, or of all: an event for each change."""
-        return StreamingResponse(
-            self._news(request, frozenset(of[:2000].split(","))),
-            media_type="text/event-stream",
-            headers={"X-Accel-Buffering": "no"},
-        )
-
-    async def _news(self, request: Request, of: frozenset[str]) -> AsyncIterator[str]:
-        yield "retry: 1000\n\n"
-        told, silent = await run_in_threadpool(self._version, of), 0.0
-        while not (self._closing.is_set() or await request.is_disconnected()):
-            await asyncio.sleep(_LOOK_SECONDS)
-            now = await run_in_threadpool(self._version, of)
-            silent += _LOOK_SECONDS
-            if now != told:
-                told, silent = now, 0.0
-                yield "event: change\ndata: 1\n\n"
-            elif silent >= _BEAT_SECONDS:
-                silent = 0.0
-                yield ": still here\n\n"
+        asked = frozenset(of[:2000].split(","))
+        look = partial(run_in_threadpool, self._version, asked)
+        return news(request, self._closing, look, _LOOK_SECONDS)
 
     def _version(self, of: frozenset[str]) -> object:
         """What changes whenever one of the directories does."""

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import asyncio
 import threading
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from fastapi import FastAPI, Request, Response
-from fastapi.responses import HTMLResponse, PlainTextResponse, RedirectResponse, StreamingResponse
+from fastapi.responses import HTMLResponse, PlainTextResponse, RedirectResponse
 from starlette.concurrency import run_in_threadpool
 
 from agents import AGENTS
 from agents.zoo.index import PREFIX, model_names
+from benchmarks.monitor.news import news
 from benchmarks.monitor.play.forms import BadForm, Forms
 from benchmarks.monitor.play.plan import plan, playable, run_path
-from benchmarks.monitor.play.session import Moment, Refused, Session
+from benchmarks.monitor.play.session import Moment, Order, Refused, Session
 from benchmarks.monitor.play.sessions import Sessions
 from benchmarks.monitor.site import NothingThere, Routes, Site
 from er_gym.envs.actions import parse
@@ -26,7 +26,7 @@ from er_gym.tasks.suites import suite_names
 from er_gym.tasks.task import Task
 
 if TYPE_CHECKING:
-    from benchmarks.cli.vlm_options import VLMOptions
+    from benchmarks.vlm_run import VLMRun
 
 KEYS: Mapping[str, str] = {
     verbs.NAVIGATE: "g",
@@ -44,8 +44,7 @@ KEYS: Mapping[str, str] = {
 _PATIENCE_SECONDS = 25.0
 """How long an answer waits for what was asked for; the page then shows how far it is."""
 _LOOK_SECONDS = 0.15
-_BEAT_SECONDS = 15.0
-_ORDERS = frozenset({"step", "go", "next"})
+_ORDERS: frozenset[str] = frozenset(get_args(Order))
 _FIRST = "mini"
 
 
@@ -56,7 +55,7 @@ class PlayPages:
         site: what all pages share.
         closing: set when the server is to end.
         folder: holds the runs that a person plays; None if nobody may play.
-        options: for vision-language agents that a person watches.
+        vlm_run: the run of a vision-language agent that a person watches; see :func:`plan`.
     """
 
     def __init__(
@@ -64,9 +63,9 @@ class PlayPages:
         site: Site,
         closing: threading.Event,
         folder: Path | None,
-        options: VLMOptions | None = None,
+        vlm_run: Callable[[str], VLMRun] | None = None,
     ) -> None:
-        self._site, self._folder, self._options = site, folder, options
+        self._site, self._folder, self._vlm_run = site, folder, vlm_run
         self._closing = closing
         self.sessions = Sessions()
         self._forms = Forms()
@@ -113,7 +112,7 @@ class PlayPages:
             about = found.description
         except ValueError as error:
             problem, status, about = problem or str(error), max(status, 400), ""
-        told = {
+        variables = {
             "on": True,
             "problem": problem,
             "secret": self._forms.secret,
@@ -128,7 +127,7 @@ class PlayPages:
             "sessions": self.sessions.open_now(),
             "folder": self._folder,
         }
-        return self._site.show(request, "play.html", told, status)
+        return self._site.show(request, "play.html", variables, status)
 
     async def begin(self, request: Request) -> Response:
         """Begin a session."""
@@ -150,7 +149,7 @@ class PlayPages:
                 type=form.get("type", ""),
                 task=form.get("task", ""),
                 agent=form.get("agent", "").strip(),
-                options=self._options,
+                vlm_run=self._vlm_run,
             )
             session = self.sessions.begin(made)
         except Refused as refused:
@@ -174,7 +173,7 @@ class PlayPages:
         self, request: Request, session: Session, now: Moment, problem: str = "", status: int = 200
     ) -> Response:
         run = session.plan.path.resolve()
-        told = {
+        variables = {
             "session": session,
             "plan": session.plan,
             "now": now,
@@ -185,7 +184,7 @@ class PlayPages:
             "place": self._site.places.at(run, "run"),
             "scripts": ("play.js",),
         }
-        return self._site.show(request, "play_session.html", told, status)
+        return self._site.show(request, "play_session.html", variables, status)
 
     async def change(self, request: Request, id: str) -> Response:
         """Do what the person asks for, and show what came of it."""
@@ -213,12 +212,13 @@ class PlayPages:
         return Response(picture.data, media_type=picture.media_type)
 
     async def news(self, request: Request, id: str) -> Response:
-        """Server-sent events: one for each change of a session."""
-        return StreamingResponse(
-            _news(request, self._session(id), self._closing),
-            media_type="text/event-stream",
-            headers={"X-Accel-Buffering": "no"},
-        )
+        """Server-sent events: one for each change of a session, with its version."""
+        session = self._session(id)
+
+        async def version() -> int:
+            return session.now.version
+
+        return news(request, self._closing, version, _LOOK_SECONDS, data=lambda number: number)
 
     def _session(self, id: str) -> Session:
         session = self.sessions.get(id)
@@ -257,18 +257,3 @@ def _asked(session: Session, form: Mapping[str, str]) -> Moment:
     if wanted not in _ORDERS:
         raise Refused("play_unknown", 400)
     return session.order(wanted)  # type: ignore[arg-type]
-
-
-async def _news(request: Request, session: Session, closing: threading.Event) -> AsyncIterator[str]:
-    yield "retry: 1000\n\n"
-    told, silent = session.now.version, 0.0
-    while not closing.is_set() and not await request.is_disconnected():
-        now = session.now
-        if now.version != told:
-            told, silent = now.version, 0.0
-            yield f"event: change\ndata: {told}\n\n"
-        elif silent >= _BEAT_SECONDS:
-            silent = 0.0
-            yield ": still here\n\n"
-        await asyncio.sleep(_LOOK_SECONDS)
-        silent += _LOOK_SECONDS

@@ -13,7 +13,7 @@ from markupsafe import Markup
 from benchmarks.monitor import formats
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.room_map import room_map
-from benchmarks.monitor.site import AN_HOUR, NothingThere, Routes, Site
+from benchmarks.monitor.site import AN_HOUR, NothingThere, Routes, Site, or_nothing
 from benchmarks.monitor.world import CannotReplay, Worlds
 from er_gym.data.pictures import encode_picture
 from er_gym.rollout.records import EpisodeRecord
@@ -71,10 +71,8 @@ class ReplayPages(ABC):
         kind = PICTURE_KINDS.get(file.suffix.lower()) if file else None
         if file is None or kind is None:
             raise NothingThere
-        try:
+        with or_nothing():
             return Response(file.read_bytes(), media_type=kind, headers=AN_HOUR)
-        except OSError:
-            raise NothingThere from None
 
     def map(self, request: Request, id: str, key: str = "") -> Response:
         """The room of an episode from above, as SVG, or why it cannot be drawn."""
@@ -87,13 +85,11 @@ class ReplayPages(ABC):
 
     def frame(self, id: str, key: str = "", n: int = 0) -> Response:
         """What the agent could see after a step, drawn now."""
-        try:
+        with or_nothing():
             manifest, record = self._played(id, key)
             if not 0 <= n < len(record.steps):
                 raise NothingThere
             picture = self._worlds.frame(manifest, record, n)
-        except CannotReplay:
-            raise NothingThere from None
         return Response(encode_picture(picture), media_type="image/jpeg", headers=AN_HOUR)
 
 

@@ -27,7 +27,7 @@ def _paper_rows() -> list[tuple[str, Mapping[str, float], float]]:
     ]
 
 
-def run_told(view: RunView, chosen: Filter) -> dict[str, Any]:
+def run_variables(view: RunView, chosen: Filter) -> dict[str, Any]:
     """What the page of a run says."""
     groups, types = view.tallies()
     choices = view.choices()
@@ -58,8 +58,8 @@ class RunPages:
         """All runs."""
         summaries = [self._site.summary(place) for place in self._site.places.of_kind("run")]
         summaries.sort(key=lambda each: (each.state != "playing", each.place.name))
-        told = {"runs": summaries, "roots": self._site.places.roots, "live": "*"}
-        return self._site.show(request, "home.html", told)
+        variables = {"runs": summaries, "roots": self._site.places.roots, "live": "*"}
+        return self._site.show(request, "home.html", variables)
 
     def run(self, request: Request, id: str) -> Response:
         """A run."""
@@ -67,5 +67,5 @@ class RunPages:
         chosen = Filter.of(request.query_params)
         with self._site.runs.use(place) as view:
             view.count_failures(_COUNT_SECONDS)
-            told = run_told(view, chosen)
-        return self._site.show(request, "run.html", {**told, "live": id})
+            variables = run_variables(view, chosen)
+        return self._site.show(request, "run.html", {**variables, "live": id})

@@ -11,8 +11,8 @@ from benchmarks.monitor.places import Place
 from benchmarks.monitor.run_view import RunSummary, Tally
 from benchmarks.monitor.site import NothingThere, Routes, Site
 from benchmarks.monitor.training_view import (
-    Curves,
     Trained,
+    curves,
     finetuning_charts,
     policy_charts,
     trained,
@@ -28,7 +28,7 @@ class TrainingPages:
 
     def __init__(self, site: Site) -> None:
         self._site = site
-        self._curves = Curves()
+        self._curves = curves()
 
     def routes(self) -> Routes:
         """The pages by address."""
@@ -43,8 +43,8 @@ class TrainingPages:
             elif place.kind in _CHARTS:
                 rows.append(trained(place))
         rows.sort(key=lambda row: (row.state != "running", row.place.name))
-        told = {"rows": rows, "roots": self._site.places.roots, "live": "*", "at": "training"}
-        return self._site.show(request, "training.html", told)
+        variables = {"rows": rows, "roots": self._site.places.roots, "live": "*", "at": "training"}
+        return self._site.show(request, "training.html", variables)
 
     def one(self, request: Request, id: str) -> Response:
         """A policy, a fine-tuning, a ladder or an ablation."""
@@ -57,8 +57,8 @@ class TrainingPages:
         with self._curves.use(place) as tail:
             run: Trained = trained(place, tail.last if tail.lines else None)
             charts = _CHARTS[place.kind](tail, t)
-        told = {"run": run, "charts": charts, "live": id, "at": "training"}
-        return self._site.show(request, "trained.html", told)
+        variables = {"run": run, "charts": charts, "live": id, "at": "training"}
+        return self._site.show(request, "trained.html", variables)
 
     def _show_plan(self, request: Request, place: Place) -> Response:
         from benchmarks.monitor.plan_view import ladder_chart, ladder_rows, studies
@@ -66,19 +66,19 @@ class TrainingPages:
         t = self._site.translator(request)
         inside = _Inside(self._site, place)
         plan, settings = self._plan(place)
-        told: dict[str, Any] = {"rows": [], "chart": "", "studies": []}
+        variables: dict[str, Any] = {"rows": [], "chart": "", "studies": []}
         if settings is not None and place.kind == "ladder":
             rows = ladder_rows(settings, inside)
-            told |= {"rows": rows, "chart": ladder_chart(rows, t)}
+            variables |= {"rows": rows, "chart": ladder_chart(rows, t)}
         elif settings is not None:
-            told["studies"] = studies(settings, inside, t)
-        told |= {
+            variables["studies"] = studies(settings, inside, t)
+        variables |= {
             "plan": plan,
             "groups": GROUPS,
             "live": ",".join([place.id, *(each.id for each in inside.places.values())][:100]),
             "at": "training",
         }
-        return self._site.show(request, "plan.html", told)
+        return self._site.show(request, "plan.html", variables)
 
     def _plan(self, place: Place) -> tuple[Any, Any]:
         # Imported when it is asked for: it knows how models are trained.

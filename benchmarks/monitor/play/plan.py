@@ -26,8 +26,7 @@ from er_gym.tasks.task import Task
 from er_gym.writing import file_stem
 
 if TYPE_CHECKING:
-    from benchmarks.cli.vlm_options import VLMOptions
-    from benchmarks.cli.vlm_run import VLMRun
+    from benchmarks.vlm_run import VLMRun
 
 _SEED = 0
 _BACKEND = "embedded"
@@ -98,7 +97,7 @@ def plan(
     type: str = "",
     task: str = "",
     agent: str = "",
-    options: VLMOptions | None = None,
+    vlm_run: Callable[[str], VLMRun] | None = None,
 ) -> Plan:
     """Plan a session.
 
@@ -108,7 +107,8 @@ def plan(
         type: of tasks; "" for any.
         task: the id of the task; "" for all of this type that have not been played.
         agent: see :class:`Plan`.
-        options: for vision-language agents.
+        vlm_run: the run of a vision-language agent by its name, with what the user says of the
+            model; None if nothing is said of it.
 
     Raises:
         ValueError: something that was given does not exist or does not fit; the message says what
@@ -118,7 +118,7 @@ def plan(
     chosen = select(
         fitted.tasks, task_ids=[task] if task else (), types=[type] if type and not task else ()
     )
-    acting = _acting(agent, options)
+    acting = _acting(agent, vlm_run)
     seen = acting.env["obs_mode"].split("+")
     shown = {"obs_mode": "+".join(seen if _SEES in seen else (*seen, _SEES))}
     manifest = Manifest(
@@ -147,7 +147,7 @@ class _Acting:
     settings: dict[str, Any] = field(default_factory=dict)
 
 
-def _acting(agent: str, options: VLMOptions | None) -> _Acting:
+def _acting(agent: str, vlm_run: Callable[[str], VLMRun] | None) -> _Acting:
     if not agent:
         alone = Cast(lambda task, seed: person_agent(seed))
         return _Acting({"obs_mode": _SEES}, lambda directory: nullcontext(alone))
@@ -161,10 +161,9 @@ def _acting(agent: str, options: VLMOptions | None) -> _Acting:
         named = Cast(NamedAgent(agent))
         obs_mode = make_agent(agent).obs_mode
         return _Acting({"obs_mode": obs_mode}, lambda directory: nullcontext(named))
-    from benchmarks.cli.vlm_options import VLMOptions
-    from benchmarks.cli.vlm_run import VLMRun
+    from benchmarks.vlm_run import VLMRun
 
-    run = VLMRun.of(agent, options or VLMOptions())
+    run = (vlm_run or VLMRun.of)(agent)
     return _Acting(
         run.env,
         lambda directory: _with_model(run, directory),

@@ -1,6 +1,22 @@
 // News: a page names what it shows; when that changes, its parts are fetched again and replaced.
 "use strict";
 
+// Calls renew for each change that an address tells of, and when the server is back; with atOnce,
+// also when it is reached first.
+const listen = (address, renew, atOnce) => {
+  let lost = atOnce;
+  const open = () => {
+    const source = new EventSource(address);
+    source.addEventListener("change", renew);
+    source.onopen = () => { if (lost) { lost = false; renew(null); } };
+    source.onerror = () => {
+      lost = true;
+      if (source.readyState === EventSource.CLOSED) { source.close(); setTimeout(open, 1000); }
+    };
+  };
+  open();
+};
+
 const live = document.body.dataset.live;
 if (live) {
   let busy = false, again = false;
@@ -31,15 +47,5 @@ if (live) {
       if (again) { again = false; setTimeout(renew, 300); }
     }
   };
-  let lost = false;
-  const listen = () => {
-    const source = new EventSource("/live?of=" + encodeURIComponent(live));
-    source.addEventListener("change", renew);
-    source.onopen = () => { if (lost) { lost = false; renew(); } };
-    source.onerror = () => {
-      lost = true;
-      if (source.readyState === EventSource.CLOSED) { source.close(); setTimeout(listen, 1000); }
-    };
-  };
-  listen();
+  listen("/live?of=" + encodeURIComponent(live), renew, false);
 }

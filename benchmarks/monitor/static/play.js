@@ -88,13 +88,5 @@ if (board()) {
     if (group) { event.preventDefault(); group.focus(); }
   });
 
-  const listen = () => {
-    const source = new EventSource(address + "/news");
-    source.addEventListener("change", renew);
-    source.onopen = () => renew(null);
-    source.onerror = () => {
-      if (source.readyState === EventSource.CLOSED) { source.close(); setTimeout(listen, 1500); }
-    };
-  };
-  listen();
+  listen(address + "/news", renew, true);  // of monitor.js
 }

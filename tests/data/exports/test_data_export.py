@@ -8,8 +8,8 @@ from typing import get_args
 import pytest
 from click.testing import CliRunner
 
-from benchmarks.cli.data_export import LANGUAGES
 from benchmarks.cli.data_export import export as command
+from benchmarks.cli.options import LANGUAGES
 from er_gym.data.collection import Collection
 from er_gym.data.exports import EXPORTS
 from er_gym.data.trajectory import Language

@@ -1,37 +1,19 @@
-"""Measures what a small vision-language model sees, beside a blind copy of itself.
-
-    er-gym data frames --suite er-1k --frames 300 --width 448 --height 252 --out runs/unseen
-    python -m benchmarks.eyes runs/ladder/er-tiny-vl/base runs/unseen
-
-The model is shown pictures of rooms that it did not learn from, by the client that plays, and is
-asked for all that is in view, and for single types. The blind copy is the same model, shown noise.
-Noise may confuse a model more than it blinds it, so its answers are also held against the truth of
-other frames: what is right then, it could have guessed without looking.
-The dialect must have words for frames, such as ``sight``.
-"""
+"""What a small vision-language model answers about frames, and the figures of that."""
 
 from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
 from dataclasses import dataclass, field, replace
-from itertools import islice
 from pathlib import Path
 
-import click
 import numpy as np
 
 from agents.vlm.chat import Message, Picture
-from agents.vlm.factory import load_settings
 from agents.vlm.pictures import noise_like
 from agents.vlm.settings import AgentSettings
-from agents.vlm.tuned_model import agent_file
-from benchmarks.cli.errors import bad_input
-from benchmarks.cli.options import Place
-from benchmarks.scoring.tables import Table, as_markdown, print_tables
-from benchmarks.terminal import stdout
+from benchmarks.scoring.tables import Table
 from er_gym.data.dialects import load_dialect
 from er_gym.data.frame_chat import Question, questions, words_for_frames
 from er_gym.data.frames import Frame, FrameSet
@@ -40,7 +22,6 @@ from er_gym.tasks.reading import read_bytes
 from er_gym.thor.objects import TYPES
 from er_gym.writing import inside
 
-_SIGHT = {"seeing": False, "blind": True}
 _KNOWN = frozenset(TYPES)
 _DRAWS = 1_000
 """Resamples of the frames for an interval."""
@@ -204,36 +185,3 @@ def figures(found: Mapping[str, Sequence[Answers]]) -> Table:
 def _share(answers: Sequence[Answers], measure: str) -> str:
     right = [each for one in answers for each in one.right.get(measure, [])]
     return f"{100 * sum(right) / len(right):.1f} of {len(right)}" if right else "-"
-
-
-@click.command()
-@click.argument("model", type=Place(exists=True, file_okay=False, path_type=Path))
-@click.argument("frames", type=Place(exists=True, file_okay=False, path_type=Path))
-@click.option("--limit", type=click.IntRange(min=1), help="Only the first N frames.")
-@click.option("--batch", type=click.IntRange(min=1), default=32, show_default=True)
-@click.option("--md", is_flag=True, help="Print Markdown.")
-def main(model: Path, frames: Path, limit: int | None, batch: int, md: bool) -> None:
-    """Measure what MODEL sees in FRAMES, beside a blind copy of itself."""
-    with bad_input():
-        settings = load_settings(
-            None,
-            ["sampling.max_tokens=200", f"local.batch={batch}", "local.reuse=false"],
-            agent_file(str(model)),
-        )
-        opened = FrameSet.open(frames)
-        chosen = list(islice(opened.frames(), limit))
-        examiner = Examiner(str(model), opened, settings)
-    with closing(examiner):
-        found = {
-            name: examine(lambda each, b=blind: examiner.answers(each, b), chosen, batch)  # type: ignore[misc]
-            for name, blind in _SIGHT.items()
-        }
-    table = figures(found)
-    if md:
-        click.echo(as_markdown([table]), nl=False)
-    else:
-        print_tables([table], stdout())
-
-
-if __name__ == "__main__":
-    main()

@@ -1,10 +1,10 @@
-"""Runs of vision-language agents: their command-line options, and how they are played."""
+"""Runs of vision-language agents: what a user says of the model, and how they are played."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,6 @@ from agents.vlm.clients.session import ModelSession
 from agents.vlm.factory import AgentFactory, comparable_settings, load_settings, settings_file
 from agents.vlm.prompts import prompts_for
 from agents.vlm.settings import AgentSettings
-from benchmarks.cli.executor import Workforce
-from benchmarks.cli.vlm_options import VLMOptions
 from er_gym.rollout import runner
 from er_gym.rollout.events import EventListener
 from er_gym.rollout.executor import Parallelism
@@ -25,9 +23,16 @@ from er_gym.tasks.task import Task
 _CONCURRENCY = 8
 
 
+def env_of(settings: AgentSettings) -> dict[str, Any]:
+    """The environment's arguments that an agent's settings ask for."""
+    size = {"width": settings.pictures.width, "height": settings.pictures.height}
+    wanted = {name: pixels for name, pixels in size.items() if pixels is not None}
+    return {**wanted, "obs_mode": settings.obs_mode}
+
+
 @dataclass(frozen=True)
 class VLMRun:
-    """The options of a run with a vision-language agent.
+    """A run with a vision-language agent.
 
     Attributes:
         name: such as ``openai:MODEL``.
@@ -45,26 +50,34 @@ class VLMRun:
     tuned_for: Path | None = None
 
     @staticmethod
-    def of(name: str, options: VLMOptions) -> VLMRun:
-        """From the options of the command line.
+    def of(
+        name: str,
+        *,
+        agent_config: str | None = None,
+        overrides: Sequence[str] = (),
+        base_url: Sequence[str] = (),
+        prompts_from: Path | None = None,
+        concurrency: int | None = None,
+        max_usd: float | None = None,
+        max_tokens: int | None = None,
+        max_minutes: float | None = None,
+    ) -> VLMRun:
+        """From the options of a command, by their names.
 
         Raises:
             ValueError: a setting does not fit.
         """
-        urls, dataset = list(options.base_url), options.prompts_from
         given = {
-            "server.base_url": urls[0] if len(urls) == 1 else urls,
-            "prompts.dataset": str(dataset or ""),
+            "server.base_url": base_url[0] if len(base_url) == 1 else list(base_url),
+            "prompts.dataset": str(prompts_from or ""),
         }
         more = [f"{name}={json.dumps(value)}" for name, value in given.items() if value]
         tuned_for = settings_file(name)
-        if tuned_for is not None and options.prompts_from is not None:
+        if tuned_for is not None and prompts_from is not None:
             more.append('prompts.dialect=""')  # instead of the model's own
-        settings = load_settings(options.agent_config, (*options.overrides, *more), tuned_for)
-        budget = Budget(
-            max_usd=options.max_usd, max_tokens=options.max_tokens, max_minutes=options.max_minutes
-        )
-        return VLMRun(name, settings, budget, options.concurrency or _CONCURRENCY, tuned_for)
+        settings = load_settings(agent_config, (*overrides, *more), tuned_for)
+        budget = Budget(max_usd=max_usd, max_tokens=max_tokens, max_minutes=max_minutes)
+        return VLMRun(name, settings, budget, concurrency or _CONCURRENCY, tuned_for)
 
     @property
     def comparable_settings(self) -> dict[str, Any]:
@@ -74,9 +87,7 @@ class VLMRun:
     @property
     def env(self) -> dict[str, Any]:
         """The environment's arguments that it asks for."""
-        size = {"width": self.settings.pictures.width, "height": self.settings.pictures.height}
-        wanted = {name: value for name, value in size.items() if value is not None}
-        return {**wanted, "obs_mode": self.settings.obs_mode}
+        return env_of(self.settings)
 
     def factory(self, run: Path) -> AgentFactory:
         """What makes the agents of a run; it keeps replies and bills in the run directory."""
@@ -91,15 +102,16 @@ class VLMRun:
         factory: AgentFactory,
         directory: RunDirectory,
         tasks: Sequence[Task],
-        workforce: Workforce,
+        parallelism: Parallelism,
         listeners: Iterable[EventListener] = (),
         say: Callable[[object], None] | None = None,
         samples: int = 1,
     ) -> RunSummary:
         """Play the tasks that the run directory has no finished episode of, each ``samples`` times.
 
-        ``say`` is called, from any thread, with messages about the server for the user; without it,
-        a logger warns.
+        ``parallelism`` states the workers and where they run; the conversations are as many as this
+        run has. ``say`` is called, from any thread, with messages about the server for the user;
+        without it, a logger warns.
         """
         if say is not None:
             factory.supervisor.show = say
@@ -108,9 +120,7 @@ class VLMRun:
             tasks,
             lambda task, seed: factory.agent(seed),
             executor="threads",
-            parallelism=Parallelism(
-                workforce.workers, self.concurrency, machines=workforce.machines
-            ),
+            parallelism=replace(parallelism, concurrency=self.concurrency),
             listeners=listeners,
             cost=lambda: factory.cost,
             samples=samples,
