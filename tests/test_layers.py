@@ -27,7 +27,7 @@ _SCRIPTS = {*_COMMAND, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "be
 ALLOWED = {
     "er_gym.plugins": {"er_gym.plugins"},
     "er_gym.activity": set(),
-    "er_gym.writing": set(),
+    "er_gym.writing": {"er_gym.writing"},
     "er_gym.extras": set(),
     "er_gym.locking": _BASE,
     "er_gym.sim": {*_BASE, "er_gym.sim"},
