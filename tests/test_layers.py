@@ -18,7 +18,7 @@ _BASE = {
 }
 _TASKS = {*_BASE, "er_gym.thor", "er_gym.tasks"}
 _ENVS = {*_TASKS, "er_gym.envs"}
-_ROLLOUT = {*_ENVS, "er_gym", "er_gym.rollout"}
+_ROLLOUT = {*_ENVS, "er_gym", "er_gym.resumable", "er_gym.rollout"}
 _DATA = {*_ROLLOUT, "er_gym.data"}
 _AGENTS = {*_DATA, "agents"}
 _SCORING = {*_DATA, "benchmarks.scoring", "benchmarks.terminal"}
@@ -35,6 +35,7 @@ ALLOWED = {
     "er_gym.tasks": _TASKS,
     "er_gym.envs": _ENVS,
     "er_gym": _ENVS,
+    "er_gym.resumable": _TASKS,
     "er_gym.rollout": _ROLLOUT,
     "er_gym.data": _DATA,
     "agents": _AGENTS,

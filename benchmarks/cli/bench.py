@@ -250,11 +250,11 @@ def bench(
 @contextmanager
 def _locked(out: Path, manifest: Manifest) -> Iterator[RunDirectory]:
     """The run directory, for this process alone; a directory that cannot be used is bad input."""
-    from er_gym.rollout.run_directory import locked_run_directory
+    from er_gym.rollout.run_directory import RunDirectory
 
     with ExitStack() as stack:
         with bad_input():
-            run_directory = stack.enter_context(locked_run_directory(out, manifest))
+            run_directory = stack.enter_context(RunDirectory.locked(out, manifest))
         yield run_directory
 
 

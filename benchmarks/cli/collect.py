@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -465,22 +465,12 @@ def _players(
 @contextmanager
 def _locked(out: Path, manifest: CollectionManifest) -> Iterator[Collection]:
     """The collection, for this process alone; a directory that cannot be used is bad input."""
-    from er_gym.data.collection import MANIFEST, PARTS, Collection
-    from er_gym.locking import exclusive_use
+    from er_gym.data.collection import Collection
 
-    with bad_input():
-        lock = exclusive_use(out)
-        lock.__enter__()
-    try:
+    with ExitStack() as stack:
         with bad_input():
-            collection = Collection.create(out, manifest)
+            collection = stack.enter_context(Collection.locked(out, manifest))
         yield collection
-    except BadInput:
-        if not (out / PARTS).exists():  # nothing has begun: the directory is free for another
-            (out / MANIFEST).unlink(missing_ok=True)
-        raise
-    finally:
-        lock.__exit__(None, None, None)
 
 
 def _in_words(summary: CollectSummary, file: Path) -> str:

@@ -180,7 +180,7 @@ BAD = {
     "a pipe": (("stats", "x"), pipe, "cannot be read (not a regular file)"),
     "a pipe to verify": (("verify", "x"), pipe, "cannot be read (not a regular file)"),
     "other tasks": (("verify", "x"), other_digest, "are not those that x was played in"),
-    "damaged part": (("verify", "x"), damaged_part, "is not a run manifest"),
+    "damaged part": (("verify", "x"), damaged_part, "is no run: "),
     "unwritten": (("stats", "x"), unwritten, "trajectories.jsonl cannot be read"),
     "cut": (("stats", "x"), cut, "trajectories.jsonl:8: "),
     "cut to verify": (("verify", "x"), cut, "trajectories.jsonl:8: "),

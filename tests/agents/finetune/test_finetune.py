@@ -369,10 +369,14 @@ def test_memory_that_is_not_there_is_told_before_loading(
             train(made, models("qwen2"), [blind.path], tmp_path / "run")
     assert not (tmp_path / "run").exists()
     train(made, models("qwen2"), [blind.path], tmp_path / "run", ignore_memory=True)
-    with pytest.raises(ValueError, match=r"holds another run \(training.epochs was 1.0, now 2.0\)"):
+    with pytest.raises(
+        ValueError, match=r"another fine-tuning run: its training.epochs is 1.0, th"
+    ):
         train(settings("training.epochs=2"), models("qwen2"), [blind.path], tmp_path / "run")
     limited = settings("training.epochs=1", "data.limit=3")
-    with pytest.raises(ValueError, match=r"data.limit was None, now 3, the data was .* other cont"):
+    with pytest.raises(
+        ValueError, match=r"its data.limit is not given, this one's 3 .*: data, data_d"
+    ):
         train(limited, models("qwen2"), [blind.path], tmp_path / "run")
     assert (
         json.loads((tmp_path / "run/finetune.json").read_text())["settings"]["data"]["limit"]
