@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ from benchmarks.cli.errors import (
     STOPPED,
     BadInput,
     bad_input,
+    entered,
     print_problem,
     report_set_aside,
 )
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     from benchmarks.cli.vlm_run import VLMRun
     from er_gym.envs.faults import Faults
     from er_gym.rollout.events import Cost, EventListener
-    from er_gym.rollout.run_directory import Manifest, RunDirectory
+    from er_gym.rollout.run_directory import RunDirectory
     from er_gym.rollout.runner import RunSummary
     from er_gym.tasks.suites import Suite
     from er_gym.tasks.task import Task
@@ -143,7 +144,7 @@ def bench(
     from er_gym import __version__
     from er_gym.rollout.agent import CannotGoOn
     from er_gym.rollout.outcomes import Outcomes
-    from er_gym.rollout.run_directory import Manifest
+    from er_gym.rollout.run_directory import Manifest, RunDirectory
     from er_gym.rollout.runner import episodes_of, tell_late
     from er_gym.rollout.selection import Shard, select
     from er_gym.rollout.worker_pool import WorkerSetupError
@@ -208,7 +209,7 @@ def bench(
         )
 
     try:
-        with _locked(out, manifest) as run_directory:
+        with entered(RunDirectory.locked(out, manifest)) as run_directory:
             for line in run_directory.move_aside(episodes):
                 print_problem(line)
             before = Outcomes.of(each for each in run_directory.episodes() if each.key in episodes)
@@ -245,17 +246,6 @@ def bench(
         )
         return CRASHED
     return 0
-
-
-@contextmanager
-def _locked(out: Path, manifest: Manifest) -> Iterator[RunDirectory]:
-    """The run directory, for this process alone; a directory that cannot be used is bad input."""
-    from er_gym.rollout.run_directory import RunDirectory
-
-    with ExitStack() as stack:
-        with bad_input():
-            run_directory = stack.enter_context(RunDirectory.locked(out, manifest))
-        yield run_directory
 
 
 def _left_in(out: Path, chosen: Sequence[Task], samples: int, *, told: bool = False) -> str:

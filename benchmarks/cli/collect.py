@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from benchmarks.cli.errors import (
     STOPPED,
     BadInput,
     bad_input,
+    entered,
     print_problem,
     report_set_aside,
 )
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     from agents.expert.recipe import Recipe
     from agents.expert.writers.registry import NamedWriter
     from benchmarks.cli.collect_progress import CollectProgress
-    from er_gym.data.collection import Collection, CollectionManifest
+    from er_gym.data.collection import CollectionManifest
     from er_gym.rollout.events import Cost
     from er_gym.tasks.suites import Suite
     from er_gym.tasks.task import Task
@@ -164,11 +165,11 @@ def collect(
     from agents.expert.collect import Collector
     from benchmarks.cli.collect_choice import chosen_recipe, chosen_tasks, fitted_tasks, source_of
     from benchmarks.cli.collect_progress import CollectProgress
-    from er_gym.data.collection import TRAJECTORIES, CollectionError
+    from er_gym.data.collection import TRAJECTORIES, Collection
     from er_gym.locking import Locked
+    from er_gym.resumable import FolderConflict
     from er_gym.rollout.agent import CannotGoOn
     from er_gym.rollout.executor import Parallelism
-    from er_gym.rollout.run_directory import RunDirectoryError
     from er_gym.rollout.worker_pool import WorkerSetupError
     from er_gym.writing import ForeignFile
 
@@ -246,7 +247,7 @@ def collect(
     bill: Cost | None = None
     try:
         with (
-            _locked(out, manifest) as collection,
+            entered(Collection.locked(out, manifest)) as collection,
             executor_options.workforce(shown.say, processors(), agents=[writer]) as workforce,
             _players(model, make_writer, out, shown) as ready,
         ):
@@ -281,7 +282,7 @@ def collect(
                 yields = selection.report(screening, strata, collection, players, limit)
     except WorkerSetupError as error:
         raise click.ClickException(str(error)) from error
-    except (CollectionError, RunDirectoryError, Locked, ForeignFile) as error:
+    except (FolderConflict, Locked, ForeignFile) as error:
         raise BadInput(f"{error}; nothing else in {out} has changed") from error
     except OSError as error:  # the disk is full, the share is gone
         raise BadInput(f"{error}; the same command continues {out}") from error
@@ -460,17 +461,6 @@ def _players(
         return
     with model.players(out, shown.say) as ready:
         yield ready
-
-
-@contextmanager
-def _locked(out: Path, manifest: CollectionManifest) -> Iterator[Collection]:
-    """The collection, for this process alone; a directory that cannot be used is bad input."""
-    from er_gym.data.collection import Collection
-
-    with ExitStack() as stack:
-        with bad_input():
-            collection = stack.enter_context(Collection.locked(out, manifest))
-        yield collection
 
 
 def _in_words(summary: CollectSummary, file: Path) -> str:

@@ -6,7 +6,7 @@ import contextlib
 import signal
 import threading
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, NoReturn, TypeVar
 
 import click
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 CRASHED, STOPPED, INTERRUPTED = 1, 3, 130
 """Exit codes: episodes crashed; a budget or the server stopped the run; Ctrl-C. Bad input is 2."""
+T = TypeVar("T")
 
 
 class BadInput(click.ClickException):
@@ -36,6 +37,15 @@ def bad_input(*more: type[Exception]) -> Iterator[None]:
         yield
     except known as error:
         raise BadInput(str(error)) from error
+
+
+@contextlib.contextmanager
+def entered(context: contextlib.AbstractContextManager[T]) -> Iterator[T]:
+    """Enter a context; what keeps it from being entered is bad input, as :func:`bad_input` says."""
+    with contextlib.ExitStack() as stack:
+        with bad_input():
+            made = stack.enter_context(context)
+        yield made
 
 
 @contextlib.contextmanager

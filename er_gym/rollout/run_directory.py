@@ -226,22 +226,15 @@ class RunDirectory(ResumableFolder[Manifest]):
 
     def read(self) -> RunContents:
         """All episodes, and the unusable files among them: broken, copied or foreign."""
-        episodes, unusable = [], []
-        for path in sorted((self.path / EPISODES).glob("*.json")):
-            try:
-                episodes.append(self._episode(path))
-            except ValueError as error:
-                unusable.append(UnusableFile(path, str(error)))
-        return RunContents(tuple(episodes), tuple(unusable))
+        found = [*self._files()]
+        return RunContents(
+            tuple(each for each in found if isinstance(each, EpisodeRecord)),
+            tuple(each for each in found if isinstance(each, UnusableFile)),
+        )
 
     def episodes(self) -> Iterator[EpisodeRecord]:
         """All episodes of this run, sorted by file name; each is read when it is asked for."""
-        for path in sorted((self.path / EPISODES).glob("*.json")):
-            try:
-                episode = self._episode(path)
-            except ValueError:
-                continue
-            yield episode
+        return (each for each in self._files() if isinstance(each, EpisodeRecord))
 
     def episode(self, key: str) -> EpisodeRecord:
         """One episode of this run.
@@ -275,6 +268,13 @@ class RunDirectory(ResumableFolder[Manifest]):
                 then = f"it is now {aside.name}, and the task is played anew"
             told.append(f"{self.path / str(one)}; {then}")
         return told
+
+    def _files(self) -> Iterator[EpisodeRecord | UnusableFile]:
+        for path in sorted((self.path / EPISODES).glob("*.json")):
+            try:
+                yield self._episode(path)
+            except ValueError as error:
+                yield UnusableFile(path, str(error))
 
     def _file(self, key: str) -> Path:
         return self.path / EPISODES / f"{file_stem(key)}.json"
