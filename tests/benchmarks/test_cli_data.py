@@ -145,8 +145,8 @@ def as_it_is(path: Path) -> None:
 
 
 BAD = {
-    "no collection": (("stats", "."), as_it_is, "is not a collection of trajectories"),
-    "nothing there": (("verify", "none"), as_it_is, "is not a collection of trajectories"),
+    "no collection": (("stats", "."), as_it_is, "is no collection: "),
+    "nothing there": (("verify", "none"), as_it_is, "is no collection: "),
     "empty": (("stats", "x"), empty, "x holds no trajectory yet"),
     "empty to show": (("show", "x", "--trajectory", "a"), empty, "x holds no trajectory yet"),
     "empty to verify": (("verify", "x"), empty, "x holds no trajectory yet"),
