@@ -176,7 +176,7 @@ def _compared(
         digest = f"{name}_digest"
         if getattr(there, digest) != getattr(here, digest):
             for each, manifest in zip(told, (there, here), strict=True):
-                each |= {name: getattr(manifest, name), digest: getattr(manifest, digest)}
+                each |= {f"--{name}": getattr(manifest, name), digest: getattr(manifest, digest)}
     return told
 
 
