@@ -17,17 +17,6 @@ _FLAGS = os.O_RDWR | os.O_CREAT | CAREFULLY
 _LONGEST = 300
 _OURS = re.compile(rb"((?P<pid>[0-9]+) (?P<host>[!-~]*)\n)?")
 """The content of the file: a process and its machine; empty if a kill came before the write."""
-MANIFESTS = {
-    "run.json": "a run",
-    "collection.json": "a collection",
-    "frames.json": "a folder of frames",
-    "export.json": "an export",
-    "finetune.json": "a fine-tuning run",
-    "model.npz": "a run of er-gym train-rl",
-    "ladder.json": "a ladder",
-    "ablation.json": "an ablation",
-}
-"""What a folder is, by the file that says so."""
 _NO_LOCKS = {errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK}
 
 
@@ -64,22 +53,6 @@ def exclusive_use(folder: Path) -> Iterator[None]:
         for path in made:
             with contextlib.suppress(OSError):
                 path.rmdir()
-
-
-def check_unused(folder: Path, manifest: str, error: type[Exception]) -> None:
-    """Raise an error if a folder without its manifest holds anything beside the lock."""
-    if folder.exists() and any(each.name != LOCK for each in folder.iterdir()):
-        raise error(f"{folder} is not empty and holds no {manifest}; choose another --out")
-
-
-def check_kind(folder: Path, manifest: str, error: type[Exception]) -> None:
-    """Raise an error if a folder without its manifest is of another kind. What else it holds, such
-    as a log that the user writes there, is left alone."""
-    if (folder / manifest).exists():
-        return
-    there = next((name for name in MANIFESTS if (folder / name).exists()), None)
-    if there is not None:
-        raise error(f"{folder} is {MANIFESTS[there]} (it holds {there}); choose another --out")
 
 
 def _make(folder: Path) -> list[Path]:

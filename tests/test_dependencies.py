@@ -24,7 +24,7 @@ PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["
 MAY_USE = {
     "er_gym": (),
     "er_gym/rollout/cluster": ("ray",),
-    "er_gym/writing.py": ("charts",),
+    "er_gym/writing/pictures.py": ("charts",),
     "er_gym/data/exports": ("data", "minari"),
     "agents": (),
     "agents/finetune": ("finetune",),

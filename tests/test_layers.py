@@ -18,7 +18,7 @@ _BASE = {
 }
 _TASKS = {*_BASE, "er_gym.thor", "er_gym.tasks"}
 _ENVS = {*_TASKS, "er_gym.envs"}
-_ROLLOUT = {*_ENVS, "er_gym", "er_gym.rollout"}
+_ROLLOUT = {*_ENVS, "er_gym", "er_gym.resumable", "er_gym.rollout"}
 _DATA = {*_ROLLOUT, "er_gym.data"}
 _AGENTS = {*_DATA, "agents"}
 _SCORING = {*_DATA, "benchmarks.scoring", "benchmarks.terminal"}
@@ -29,7 +29,7 @@ _SCRIPTS = {*_HARNESS, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "be
 ALLOWED = {
     "er_gym.plugins": {"er_gym.plugins"},
     "er_gym.activity": set(),
-    "er_gym.writing": set(),
+    "er_gym.writing": {"er_gym.writing"},
     "er_gym.extras": set(),
     "er_gym.locking": _BASE,
     "er_gym.sim": {*_BASE, "er_gym.sim"},
@@ -37,6 +37,7 @@ ALLOWED = {
     "er_gym.tasks": _TASKS,
     "er_gym.envs": _ENVS,
     "er_gym": _ENVS,
+    "er_gym.resumable": _TASKS,
     "er_gym.rollout": _ROLLOUT,
     "er_gym.data": _DATA,
     "agents": _AGENTS,

@@ -289,6 +289,47 @@ def test_a_folder_is_written_whole_or_not_at_all(is_there: bool, tmp_path: Path)
         whole_folder(out).__enter__()
 
 
+def test_a_folder_with_the_stamp_is_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+
+    def write(*names: str) -> None:
+        with whole_folder(out, "stamp") as draft:
+            for name in names:
+                (draft / name).write_text("".join(names))
+
+    def content() -> dict[str, str]:
+        return {each.name: each.read_text() for each in out.iterdir()}
+
+    write("a", "stamp")
+    write("stamp", "a", "b")
+    assert content() == dict.fromkeys(("stamp", "a", "b"), "stampab")
+    with pytest.raises(ForeignFile, match=r"out is not empty; .*would be lost: b"):
+        write("a", "stamp")
+    with pytest.raises(ForeignFile, match=r"out is not empty; choose another output"):
+        whole_folder(out, "another stamp").__enter__()
+    assert content() == dict.fromkeys(("stamp", "a", "b"), "stampab")
+    assert [*tmp_path.iterdir()] == [out]
+
+
+def test_a_folder_whose_draft_cannot_be_moved_is_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, rename = tmp_path / "out", Path.rename
+    with whole_folder(out, "stamp") as draft:
+        (draft / "stamp").touch()
+
+    def full(self: Path, to: Path) -> Path:
+        if self.suffix == ".draft":
+            raise OSError(28, "No space left on device")
+        return rename(self, to)
+
+    monkeypatch.setattr(Path, "rename", full)
+    with pytest.raises(OSError, match="No space"), whole_folder(out, "stamp") as draft:
+        (draft / "stamp").write_text("new")
+    assert [*tmp_path.rglob("*")] == [out, out / "stamp"]
+    assert not (out / "stamp").read_text()
+
+
 def test_a_folder_that_others_fill_meanwhile_is_theirs(tmp_path: Path) -> None:
     with (
         pytest.raises(ForeignFile, match="was empty and is no more"),

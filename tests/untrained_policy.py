@@ -11,7 +11,7 @@ from agents.rl.config import TrainConfig
 from agents.rl.model_file import placeholder_env, save
 from agents.rl.policy_file import LEARNERS
 from agents.rl.policy_observation import PolicyObservation
-from agents.rl.train import ALGORITHMS, prepare_run
+from agents.rl.train import ALGORITHMS, TRAINING
 from er_gym.envs.actions import ACTIONS
 
 
@@ -30,6 +30,6 @@ def write_untrained_run(config: TrainConfig, run: Path, *, steps: int | None = N
     for weights in model.policy.parameters():  # so that no two actions are alike
         torch.nn.init.normal_(weights, std=0.3)
     model.num_timesteps = config.total_steps if steps is None else steps
-    prepare_run(config, run)
+    TRAINING.begin(run, config)
     save(model, run)
     return model

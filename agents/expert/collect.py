@@ -24,7 +24,7 @@ from er_gym.data.trajectory import Trajectory
 from er_gym.envs.actions import Action
 from er_gym.rollout.events import Cost, EventListener
 from er_gym.rollout.executor import Parallelism
-from er_gym.rollout.run_directory import Manifest, RunDirectory, locked_run_directory
+from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.rollout.runner import run
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME
@@ -392,7 +392,7 @@ class Collector:
             er_gym=settings.manifest["er_gym"],
         )
         path = self._collection.part_path(part)
-        with locked_run_directory(path, manifest) as directory:
+        with RunDirectory.locked(path, manifest) as directory:
             yield directory
 
     def _play(self, directory: RunDirectory, strata: Sequence[Stratum], most: int) -> None:

@@ -18,27 +18,22 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from agents.finetune.model_files import MANIFEST, MODEL, History
-from er_gym.locking import check_unused
-from er_gym.tasks.reading import read_bytes
+from er_gym.resumable import FolderKind
 from er_gym.writing import make_folder, write_atomic
 
 CHECKPOINTS, LOGS, METRICS = "checkpoints", "logs", "metrics.jsonl"
 _CHECKPOINT = re.compile(r"checkpoint-(\d+)")
 
 
-class RunConflict(ValueError):
-    """The directory holds something else; the message says what to do."""
-
-
-class Manifest(BaseModel):
+class FinetuneManifest(BaseModel):
     """What is tuned on what. Two commands with equal manifests may share a directory.
 
     Attributes:
@@ -85,54 +80,12 @@ class RunFiles:
         """The newest checkpoint; None if there is none."""
         return max(self._all_checkpoints(), key=_updates, default=None)
 
-    def check(self, manifest: Manifest) -> None:
-        """Raise RunConflict if the directory holds another run, or anything else.
-
-        A run without a checkpoint has learnt nothing, and may be replaced.
-        """
-        if not self.path.exists():
-            return
-        if not (self.path / MANIFEST).is_file():
-            check_unused(self.path, MANIFEST, RunConflict)
-            return
-        try:
-            there = Manifest.model_validate_json(read_bytes(self.path / MANIFEST))
-        except ValidationError as error:
-            raise RunConflict(
-                f"{self.path / MANIFEST} is not a fine-tuning run's: "
-                f"{error.errors()[0]['msg']}; choose another --out"
-            ) from None
-        if not (self.finished or self.last_checkpoint()):
-            return
-        differ = [*_differences(there.settings, manifest.settings)]
-        if there.model_digest != manifest.model_digest:
-            differ.append(f"the model was {there.model}, now {manifest.model}, with other files")
-        if there.data_digest != manifest.data_digest:
-            differ.append(f"the data was {there.data}, now {manifest.data}, with other content")
-        if differ:
-            raise RunConflict(
-                f"{self.path} holds another run ({', '.join(differ)}); choose another --out, or "
-                "repeat its command"
-            )
-
-    def begin(self, manifest: Manifest) -> None:
-        """Write the manifest, if this run is new, and remove what a kill left half-written."""
+    def clear(self) -> None:
+        """Make the folder of checkpoints, and remove what a kill left half-written."""
         make_folder(self.checkpoints)
         for folder in (self.path, self.checkpoints):
             for draft in folder.glob(".*.draft"):
                 shutil.rmtree(draft)
-        if self.last_checkpoint() is None:
-            shutil.rmtree(self.path / LOGS, ignore_errors=True)
-            (self.path / METRICS).unlink(missing_ok=True)
-            write_atomic(self.path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
-
-    def withdraw(self) -> None:
-        """Remove the files of a run without a checkpoint."""
-        if self.last_checkpoint() is None and not self.finished:
-            for folder in (self.checkpoints, self.path / LOGS):
-                shutil.rmtree(folder, ignore_errors=True)
-            for name in (METRICS, MANIFEST):
-                (self.path / name).unlink(missing_ok=True)
 
     def prune(self, keep: int) -> None:
         """Remove all but the newest checkpoints."""
@@ -205,10 +158,34 @@ def _updates(checkpoint: Path) -> int:
     return int(found[1]) if found else -1
 
 
-def _differences(one: dict[str, Any], other: dict[str, Any], path: str = "") -> Iterator[str]:
-    for name in sorted({*one, *other}):
-        a, b = one.get(name), other.get(name)
-        if isinstance(a, dict) and isinstance(b, dict):
-            yield from _differences(a, b, f"{path}{name}.")
-        elif a != b:
-            yield f"{path}{name} was {a}, now {b}"
+def _given(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings without those that are None, as a version that did not have them wrote none."""
+    return {
+        name: _given(value) if isinstance(value, dict) else value
+        for name, value in settings.items()
+        if value is not None
+    }
+
+
+def _compared(
+    there: FinetuneManifest, here: FinetuneManifest
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Settings, model and data; where the content is the same, its path may be another."""
+    told = _given(there.settings), _given(here.settings)
+    for name in ("model", "data"):
+        digest = f"{name}_digest"
+        if getattr(there, digest) != getattr(here, digest):
+            for each, manifest in zip(told, (there, here), strict=True):
+                each |= {f"--{name}": getattr(manifest, name), digest: getattr(manifest, digest)}
+    return told
+
+
+FINETUNING = FolderKind(
+    noun="fine-tuning run",
+    command="er-gym finetune",
+    manifest=MANIFEST,
+    model=FinetuneManifest,
+    parts=(CHECKPOINTS, LOGS, METRICS),
+    holds_something=lambda path: RunFiles(path).finished or bool(RunFiles(path).last_checkpoint()),
+    compared=_compared,
+)

@@ -38,10 +38,7 @@ from agents.finetune.model_files import (
     settings_as_json,
 )
 from agents.finetune.optimizer import MuonAdamW
-from agents.finetune.run_files import (
-    Manifest,
-    RunFiles,
-)
+from agents.finetune.run_files import FINETUNING, FinetuneManifest, RunFiles
 from agents.finetune.samples import Samples, open_samples
 from agents.finetune.settings import FinetuneSettings, Lora
 from agents.finetune.tokens import EncodedChat, Encoder, check_lengths
@@ -49,7 +46,6 @@ from agents.vlm.clients.adapters import adapter_chain, with_adapter
 from agents.vlm.clients.checkpoint import one_line
 from agents.vlm.tuned_model import recorded_pictures
 from er_gym.activity import begin
-from er_gym.locking import exclusive_use
 
 _EYES = {"vision": r"model\.visual\.(?!.*merger)", "projector": r"model\.visual\..*merger"}
 """Names of the weights of each part that the settings can freeze."""
@@ -102,7 +98,7 @@ def train(
 
     Raises:
         ValueError: settings, model and data do not go together, or there is not enough memory.
-        RunConflict: the directory holds another run.
+        FolderConflict: the directory holds another run.
         Locked: another process trains in the directory.
         KeyboardInterrupt: Ctrl-C; what was learnt since the last checkpoint is lost.
     """
@@ -113,7 +109,7 @@ def train(
     begin("reading the conversations")
     samples = open_samples(data, settings.data)
     check_prompts(files, samples.prompts)
-    manifest = Manifest(
+    manifest = FinetuneManifest(
         settings=settings_as_json(settings),
         model=str(files.path),
         model_digest=files.digest,
@@ -128,19 +124,13 @@ def train(
         say = _to_nobody
     with ExitStack() as stack:
         if first:
-            stack.enter_context(exclusive_use(out))
+            stack.enter_context(FINETUNING.locked(out, manifest))
+        else:
+            FINETUNING.check(out, manifest)
         stack.enter_context(quiet_libraries())
-        run.check(manifest)
         if run.finished:
             return _result(run, samples, new=False)
-        try:
-            return _train(
-                settings, files, samples, run, manifest, first, ignore_memory, report, say
-            )
-        except BaseException:
-            if first:
-                run.withdraw()
-            raise
+        return _train(settings, files, samples, run, manifest, first, ignore_memory, report, say)
 
 
 def _train(
@@ -148,7 +138,7 @@ def _train(
     files: ModelFiles,
     samples: Samples,
     run: RunFiles,
-    manifest: Manifest,
+    manifest: FinetuneManifest,
     first: bool,
     ignore_memory: bool,
     report: Callable[[Progress], None],
@@ -216,7 +206,7 @@ def _train(
 
     # -- the loop --
     if first:
-        run.begin(manifest)
+        run.clear()
     padding = tokenizer.pad_token_id
     padding = padding if padding is not None else (tokenizer.eos_token_id or 0)
     trainer = FinetuneTrainer(

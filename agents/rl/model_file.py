@@ -25,12 +25,12 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
 from agents.rl.policy_file import (
     ABOUT,
-    FORMAT,
     MODEL,
+    about,
     check_about,
+    model_errors,
     read_about,
     read_tensor,
-    unreadable,
 )
 from er_gym.writing import write_atomic
 
@@ -45,9 +45,9 @@ Arrays = dict[str, NDArray[Any]]
 
 def save(model: BaseAlgorithm, run: Path) -> None:
     """Write the model; the file is replaced as a whole."""
-    about = np.frombuffer(json.dumps(_about(model)).encode(), np.uint8)
+    told = np.frombuffer(json.dumps(_about(model)).encode(), np.uint8)
     archive = io.BytesIO()
-    arrays: dict[str, Any] = {ABOUT: about, **_arrays(model)}
+    arrays: dict[str, Any] = {ABOUT: told, **_arrays(model)}
     np.savez(archive, **arrays)
     write_atomic(run / MODEL, archive.getvalue())
 
@@ -61,11 +61,9 @@ def _arrays(model: BaseAlgorithm) -> Arrays:
 
 
 def _about(model: BaseAlgorithm) -> dict[str, Any]:
+    sees = cast(spaces.Dict, model.observation_space)
     return {
-        "format": FORMAT,
-        "algorithm": type(model).__name__,
-        "sees": _shapes(model.observation_space),
-        "actions": int(cast(spaces.Discrete, model.action_space).n),
+        **about(type(model).__name__, sees, int(cast(spaces.Discrete, model.action_space).n)),
         "counters": {name: getattr(model, name) for name in _COUNTERS if hasattr(model, name)},
         # Of the last episodes, for the means in the curve.
         "episodes": [
@@ -92,18 +90,11 @@ def log_again(file: Path, model: BaseAlgorithm) -> None:
     Raises:
         ValueError: the file is damaged.
     """
-    try:
+    with model_errors(file):
         with zipfile.ZipFile(file) as archive:
             logged = read_about(archive).get("logged", {})  # older files lack it
         for name, value in logged.items():
             model.logger.record(str(name), float(value))
-    except (zipfile.BadZipFile, OSError, KeyError, TypeError, ValueError, AttributeError) as error:
-        raise unreadable(file, error) from error
-
-
-def _shapes(space: spaces.Space[Any]) -> dict[str, list[int]]:
-    assert isinstance(space, spaces.Dict)
-    return {name: list(box.shape or ()) for name, box in space.spaces.items()}
 
 
 # -- reading -------------------------------------------------------------------------------------
@@ -115,10 +106,10 @@ def restore(file: Path, model: BaseAlgorithm) -> None:
     Raises:
         ValueError: the file is damaged or belongs to another learner.
     """
-    try:
+    with model_errors(file):
         with zipfile.ZipFile(file) as archive:
-            about = read_about(archive)
-            check_about(about, _about(model))
+            told = read_about(archive)
+            check_about(told, _about(model))
             weights = model.policy.state_dict()
             policy = {
                 name: read_tensor(archive, f"policy/{name}", value)
@@ -129,16 +120,9 @@ def restore(file: Path, model: BaseAlgorithm) -> None:
         model.set_parameters(found, device="cpu")
         for name in _COUNTERS:
             if hasattr(model, name):
-                setattr(model, name, type(getattr(model, name))(about["counters"][name]))
+                setattr(model, name, type(getattr(model, name))(told["counters"][name]))
         for name, kept in (("ep_info_buffer", "episodes"), ("ep_success_buffer", "successes")):
-            setattr(model, name, deque(about[kept], maxlen=model._stats_window_size))
-    # zipfile and numpy raise these for archives that are damaged, cut short, encrypted, compressed
-    # in a way unknown here, or that hold other arrays.
-    except (
-        zipfile.BadZipFile, OSError, KeyError, TypeError, ValueError, RuntimeError, MemoryError,
-        NotImplementedError, EOFError,
-    ) as error:  # fmt: skip
-        raise unreadable(file, error) from error
+            setattr(model, name, deque(told[kept], maxlen=model._stats_window_size))
 
 
 def _optimizer(archive: zipfile.ZipFile, model: BaseAlgorithm) -> dict[str, Any]:

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -99,33 +100,36 @@ def load_network(file: Path) -> TypeNetwork:
     config = load_config(file.parent / CONFIG)
     network = _untrained(config)
     read = _read_safetensors if file.name == POLICY else _read_archive
-    try:
-        about, weights = read(file, config, network.state_dict())
-        check_about(about, _about(config))
+    with model_errors(file):
+        told, weights = read(file, config, network.state_dict())
+        check_about(told, _about(config))
         network.load_state_dict(weights)
-    # zipfile, numpy and torch raise these for files that are damaged, cut short, encrypted,
-    # compressed in a way unknown here, or that hold other arrays. NotImplementedError is zipfile's
-    # for the compression, EOFError for a file cut short; SafetensorError is safetensors' for all.
-    except (
-        zipfile.BadZipFile, OSError, KeyError, TypeError, ValueError, RuntimeError, MemoryError,
-        NotImplementedError, EOFError, SafetensorError,
-    ) as error:  # fmt: skip
-        raise unreadable(file, error) from error
     return network.eval()
 
 
-def unreadable(file: Path, error: Exception) -> ValueError:
-    """The error for a damaged file."""
-    why = " ".join(str(error).split()) or type(error).__name__
-    return ValueError(f"{file} cannot be read as a model: {why}")
+@contextmanager
+def model_errors(file: Path) -> Iterator[None]:
+    """Raise ValueError for whatever reading a damaged model file raises."""
+    try:
+        yield
+    # zipfile, numpy and torch raise these for files that are damaged, cut short, encrypted,
+    # compressed in a way unknown here, or that hold other arrays. NotImplementedError is zipfile's
+    # for the compression, EOFError for a file cut short; SafetensorError is safetensors' for all;
+    # AttributeError comes of JSON that is no table.
+    except (
+        zipfile.BadZipFile, OSError, KeyError, TypeError, ValueError, RuntimeError, MemoryError,
+        NotImplementedError, EOFError, SafetensorError, AttributeError,
+    ) as error:  # fmt: skip
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise ValueError(f"{file} cannot be read as a model: {why}") from error
 
 
-def check_about(about: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+def check_about(told: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
     """Raise ValueError if a file's learner is another than is wanted."""
     for name in ("format", "algorithm", "sees", "actions"):
-        if about[name] != wanted[name]:
+        if told[name] != wanted[name]:
             raise ValueError(
-                f"its {name} is {about[name]}, and {wanted[name]} is needed here; use the er-gym "
+                f"its {name} is {told[name]}, and {wanted[name]} is needed here; use the er-gym "
                 "that it was trained with, or train again"
             )
 
@@ -160,9 +164,9 @@ def _read_archive(
 ) -> tuple[Any, Weights]:
     start = LEARNERS[config.algorithm.name].network
     with zipfile.ZipFile(file) as archive:
-        about = read_about(archive)
-        check_about(about, _about(config))  # before an array's shape is found to be another
-        return about, {
+        told = read_about(archive)
+        check_about(told, _about(config))  # before an array's shape is found to be another
+        return told, {
             name: read_tensor(archive, f"policy/{start}{name}", value)
             for name, value in like.items()
         }
@@ -172,8 +176,8 @@ def _read_safetensors(
     file: Path, config: TrainConfig, like: Mapping[str, torch.Tensor]
 ) -> tuple[Any, Weights]:
     with safe_open(file, framework="pt") as opened:
-        about = json.loads((opened.metadata() or {})[ABOUT])
-        return about, {name: opened.get_tensor(name) for name in opened.keys()}  # noqa: SIM118
+        told = json.loads((opened.metadata() or {})[ABOUT])
+        return told, {name: opened.get_tensor(name) for name in opened.keys()}  # noqa: SIM118
 
 
 def _untrained(config: TrainConfig) -> TypeNetwork:
@@ -191,15 +195,20 @@ def channels_first(space: spaces.Dict) -> spaces.Dict:
     return spaces.Dict(boxes)
 
 
-def _about(config: TrainConfig) -> dict[str, Any]:
-    learner = LEARNERS[config.algorithm.name]
-    space = channels_first(PolicyObservation(config.env, learner.needs_mask).space)
+def about(algorithm: str, sees: spaces.Dict, actions: int) -> dict[str, Any]:
+    """What a file says of the learner whose weights it holds."""
     return {
         "format": FORMAT,
-        "algorithm": learner.name,
-        "sees": {name: list(box.shape or ()) for name, box in space.spaces.items()},
-        "actions": len(ACTIONS),
+        "algorithm": algorithm,
+        "sees": {name: list(box.shape or ()) for name, box in sees.spaces.items()},
+        "actions": actions,
     }
+
+
+def _about(config: TrainConfig) -> dict[str, Any]:
+    learner = LEARNERS[config.algorithm.name]
+    space = PolicyObservation(config.env, learner.needs_mask).space
+    return about(learner.name, channels_first(space), len(ACTIONS))
 
 
 # -- writing -------------------------------------------------------------------------------------
@@ -211,11 +220,8 @@ def trained_steps(run: Path) -> int:
     Raises:
         ValueError: the file cannot be read.
     """
-    try:
-        with zipfile.ZipFile(run / MODEL) as archive:
-            return int(read_about(archive)["counters"]["num_timesteps"])
-    except (zipfile.BadZipFile, OSError, KeyError, TypeError, ValueError) as error:
-        raise unreadable(run / MODEL, error) from error
+    with model_errors(run / MODEL), zipfile.ZipFile(run / MODEL) as archive:
+        return int(read_about(archive)["counters"]["num_timesteps"])
 
 
 def write_policy(run: Path, folder: Path, dtype: torch.dtype) -> None:

@@ -8,7 +8,6 @@ done, it does nothing.
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
@@ -49,11 +48,10 @@ from agents.rl.vec_env import WorkerVecEnv
 from agents.rl.warm_start import WARM_START, warm_start
 from er_gym.activity import begin
 from er_gym.envs.actions import ACTIONS
-from er_gym.locking import check_kind, exclusive_use
-from er_gym.writing import YAML_MARK, is_ours, make_folder, write_atomic
+from er_gym.resumable import FolderKind
+from er_gym.writing import YAML_MARK, write_atomic
 
 TENSORBOARD = "tensorboard"
-_OF_A_RUN = (MODEL, CURVE, WARM_START, TENSORBOARD)
 _EVALUATION_SEED = 10_000
 """All evaluations of all runs use the same episodes."""
 
@@ -67,8 +65,23 @@ ALGORITHMS: Mapping[str, Callable[..., BaseAlgorithm]] = {
 environments."""
 
 
-class RunConflict(ValueError):
-    """The directory holds another run; the message says what to do."""
+TRAINING = FolderKind(
+    noun="run",
+    command="er-gym train-rl",
+    manifest=CONFIG,
+    model=TrainConfig,
+    parts=(CURVE, WARM_START, TENSORBOARD, MODEL),
+    holds_something=lambda run: (run / MODEL).exists(),
+    shared=True,
+    compared=lambda there, here: (_compared(there), _compared(here)),
+    load=load_config,
+    text=lambda config: YAML_MARK + dump(config),
+)
+
+
+def _compared(config: TrainConfig) -> dict[str, Any]:
+    """All but the number of steps, which may grow."""
+    return config.model_dump(mode="json", exclude={"total_steps"})
 
 
 def train(
@@ -87,18 +100,13 @@ def train(
         more: additional callbacks.
 
     Raises:
-        RunConflict: the directory holds a run of another configuration.
+        FolderConflict: the directory holds a run of another configuration.
         Locked: another process trains in the directory.
         KeyboardInterrupt: Ctrl-C; the learner is saved first.
     """
-    with exclusive_use(run):
-        new = prepare_run(config, run)
-        try:
-            return _train(config, run, show_progress, more)
-        except BaseException:  # Ctrl-C too
-            if new and not (run / MODEL).exists():
-                _withdraw(run)
-            raise
+    with TRAINING.locked(run, config):
+        write_atomic(run / CONFIG, TRAINING.text(config))  # with the number of steps of now
+        return _train(config, run, show_progress, more)
 
 
 def _train(
@@ -192,57 +200,6 @@ def fast_arithmetic() -> Iterator[None]:
 def _held_out(config: TrainConfig, asked: Evaluation, before: int) -> HeldOutEvaluation:
     env = make_vec_env(config, evaluation_config(config.env, asked.episodes), _EVALUATION_SEED)
     return HeldOutEvaluation(env, asked.every, asked.count, _EVALUATION_SEED, before)
-
-
-def prepare_run(config: TrainConfig, run: Path) -> bool:
-    """Make the run directory, or check that it belongs to this run; returns whether the run is new.
-
-    The number of steps may grow; everything else must be equal. A run that was killed before its
-    first checkpoint is started again.
-
-    Raises:
-        RunConflict: the directory belongs to another run, or holds files that er-gym did not write.
-    """
-    file = run / CONFIG
-    new = not (run / MODEL).exists()
-    if file.exists() and new and not is_ours(file):
-        raise RunConflict(f"{file} exists, and er-gym did not write it; give another --out")
-    if not file.exists():
-        check_kind(run, CONFIG, RunConflict)
-        there = [name for name in _OF_A_RUN if (run / name).exists()]
-        if there:
-            raise RunConflict(
-                f"{run} holds {there[0]} but no {CONFIG} that describes the run; give another --out"
-            )
-    elif not new:
-        before = load_config(file)
-        if before.model_copy(update={"total_steps": config.total_steps}) != config:
-            differ = _differences(before.model_dump(), config.model_dump())
-            raise RunConflict(
-                f"{run} holds a run of another configuration ({differ}); give another --out, or "
-                "the configuration that it started with"
-            )
-    make_folder(run)
-    write_atomic(file, YAML_MARK + dump(config))
-    return new
-
-
-def _withdraw(run: Path) -> None:
-    """Remove the files of a run without a checkpoint, so that another run may use the directory."""
-    shutil.rmtree(run / TENSORBOARD, ignore_errors=True)
-    for name in (CURVE, WARM_START, CONFIG):
-        (run / name).unlink(missing_ok=True)
-
-
-def _differences(one: dict[str, Any], other: dict[str, Any], path: str = "") -> str:
-    found = []
-    for name in one:
-        a, b = one[name], other.get(name)
-        if isinstance(a, dict) and isinstance(b, dict):
-            found.append(_differences(a, b, f"{path}{name}."))
-        elif a != b and f"{path}{name}" != "total_steps":
-            found.append(f"{path}{name} was {a}, now {b}")
-    return ", ".join(filter(None, found))
 
 
 def load_last_checkpoint(run: Path) -> BaseAlgorithm | None:

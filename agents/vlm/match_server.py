@@ -24,6 +24,7 @@ from werkzeug.exceptions import HTTPException
 from werkzeug.serving import make_server
 
 from agents.vlm.matching import Matcher
+from er_gym.tasks.errors import first_problem
 
 HOST = "127.0.0.1"
 _LARGEST_BODY = 1 << 20  # bytes
@@ -62,7 +63,7 @@ def make_app(matcher: Matcher) -> Flask:
         try:
             asked = MatchRequest.model_validate_json(request.get_data())
         except ValidationError as error:
-            return jsonify(error=_one_line(error)), 400
+            return jsonify(error=first_problem(error, "the body")), 400
         names = asked.names if asked.name is None else [asked.name]
         matches = [asdict(each) for each in matcher.match_many(names or [], asked.prefer)]
         return jsonify(matches[0] if asked.name is not None else {"matches": matches})
@@ -76,12 +77,6 @@ def make_app(matcher: Matcher) -> Flask:
         return jsonify(error=str(error)), 500
 
     return app
-
-
-def _one_line(error: ValidationError) -> str:
-    first = error.errors(include_url=False)[0]
-    where = ".".join(map(str, first["loc"])) or "the body"
-    return f"{where}: {' '.join(first['msg'].removeprefix('Value error, ').split())}"
 
 
 def serve(matcher: Matcher, port: int) -> None:

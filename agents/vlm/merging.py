@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import secrets
 import shutil
 from pathlib import Path
 from typing import Any
 
 from agents.vlm.tuned_model import MODEL, RUN
-from er_gym.writing import check_replaceable, replace_folder, write_atomic
+from er_gym.writing import whole_folder, write_atomic
 
 STAMP = "merged_from.json"
 """The file that says what a model was merged from."""
@@ -55,21 +54,16 @@ def merge(directory: Path) -> Path:
     stamp = json.dumps([_files(each) for each in (base, *adapters)])
     if (target / STAMP).is_file() and (target / STAMP).read_text(encoding="utf-8") == stamp:
         return target
-    check_replaceable(target, STAMP)
-    draft = target.with_name(f".{target.name}.{secrets.token_hex(4)}.draft")
     try:
-        draft.mkdir()
-        for source in (base, *adapters):  # what an adapter brings counts
-            for file in source.iterdir():
-                if file.suffix in _COPIED and not file.name.startswith(_NOT_COPIED):
-                    shutil.copyfile(file, draft / file.name)
-        _merged(base, adapters).save_pretrained(draft)
-        write_atomic(draft / STAMP, stamp)
-        replace_folder(draft, target, STAMP)
+        with whole_folder(target, STAMP) as draft:
+            for source in (base, *adapters):  # what an adapter brings counts
+                for file in source.iterdir():
+                    if file.suffix in _COPIED and not file.name.startswith(_NOT_COPIED):
+                        shutil.copyfile(file, draft / file.name)
+            _merged(base, adapters).save_pretrained(draft)
+            write_atomic(draft / STAMP, stamp)
     except OSError as error:
         raise ValueError(f"{target} cannot be written: {error.strerror or error}") from None
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
     return target
 
 

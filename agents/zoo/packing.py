@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import torch
@@ -30,7 +29,7 @@ from agents.vlm.tuned_model import RUN, model_directory
 from agents.zoo.card import Kind
 from agents.zoo.index import CARD, MOST_BYTES, SUFFIXES, files_of
 from er_gym.tasks.reading import parse_json, read_text
-from er_gym.writing import check_output, check_replaceable, replace_folder, write_atomic
+from er_gym.writing import check_folder, check_output, whole_folder, write_atomic
 
 DTYPES = {"float16": torch.float16, "bfloat16": torch.bfloat16, "float32": torch.float32}
 """The types of weights in a folder, by name."""
@@ -101,18 +100,15 @@ def new_folder(models: Path, name: str) -> Iterator[Path]:
         ValueError: the folder would hold a file that no model may have, all models together would
             be too large, or the folder holds something that is no model's.
     """
-    check_replaceable(models / name, CARD)
+    check_folder(models / name, CARD)
     if (models / name).is_dir():
         check_output(models / name / CARD)
     models.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(dir=models, prefix=f".{name}-") as made:
-        draft = Path(made) / name
-        draft.mkdir()
+    with whole_folder(models / name, CARD) as draft:
         yield draft
         check_files(draft)
-        others = (each for each in models.glob("[!.]*") if each.is_dir() and each.name != name)
-        check_size((*others, draft))
-        replace_folder(draft, models / name, CARD)
+        there = {each.name: each for each in models.glob("[!.]*") if each.is_dir()}
+        check_size({**there, name: draft})
 
 
 def _refuse_links(folder: Path, files: Iterable[Path]) -> None:
@@ -135,9 +131,9 @@ def check_files(folder: Path) -> None:
             )
 
 
-def check_size(folders: tuple[Path, ...]) -> None:
-    """Raise ValueError if the files of these folders are too large together."""
-    sizes = {each.name: size_of(each) for each in folders}
+def check_size(folders: Mapping[str, Path]) -> None:
+    """Raise ValueError if the files of these folders, by name, are too large together."""
+    sizes = {name: size_of(folder) for name, folder in folders.items()}
     if (total := sum(sizes.values())) > MOST_BYTES:
         raise ValueError(
             f"the models would have {total:,} bytes together, and {MOST_BYTES:,} are allowed: "

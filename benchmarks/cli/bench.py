@@ -128,7 +128,7 @@ def bench(options: BenchOptions, executor_options: ExecutorOptions, vlm_options:
     from er_gym import __version__
     from er_gym.rollout.agent import CannotGoOn
     from er_gym.rollout.outcomes import Outcomes
-    from er_gym.rollout.run_directory import Manifest, locked_run_directory
+    from er_gym.rollout.run_directory import Manifest, RunDirectory
     from er_gym.rollout.runner import episodes_of, tell_late
     from er_gym.rollout.selection import Shard, select
     from er_gym.rollout.worker_pool import WorkerSetupError
@@ -180,7 +180,7 @@ def bench(options: BenchOptions, executor_options: ExecutorOptions, vlm_options:
         )
 
     try:
-        with entered(lambda: locked_run_directory(out, manifest)) as run_directory:
+        with entered(lambda: RunDirectory.locked(out, manifest)) as run_directory:
             for line in run_directory.move_aside(episodes):
                 print_problem(line)
             before = Outcomes.of(each for each in run_directory.episodes() if each.key in episodes)

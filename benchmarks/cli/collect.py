@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from agents.expert.players import Players
     from agents.expert.recipe import Recipe
     from agents.expert.writers.registry import NamedWriter
-    from er_gym.data.collection import Collection, CollectionManifest
     from er_gym.rollout.events import Cost
 
 
@@ -69,10 +68,10 @@ def collect(
     from benchmarks.cli.collect_choice import chosen_recipe, source_of
     from benchmarks.cli.collect_plan import candidates, settings_of
     from benchmarks.cli.progress import CollectProgress
-    from er_gym.data.collection import TRAJECTORIES, CollectionError
+    from er_gym.data.collection import TRAJECTORIES, Collection
     from er_gym.locking import Locked
+    from er_gym.resumable import FolderConflict
     from er_gym.rollout.agent import CannotGoOn
-    from er_gym.rollout.run_directory import RunDirectoryError
     from er_gym.rollout.worker_pool import WorkerSetupError
     from er_gym.writing import ForeignFile
 
@@ -124,7 +123,7 @@ def collect(
     bill: Cost | None = None
     try:
         with (
-            _locked(out, manifest) as collection,
+            entered(lambda: Collection.locked(out, manifest)) as collection,
             executor_options.workforce(
                 shown.say, processors(), agents=[options.writer]
             ) as workforce,
@@ -155,7 +154,7 @@ def collect(
                 yields = selection.report(screening, strata, collection, players, options.limit)
     except WorkerSetupError as error:
         raise click.ClickException(str(error)) from error
-    except (CollectionError, RunDirectoryError, Locked, ForeignFile) as error:
+    except (FolderConflict, Locked, ForeignFile) as error:
         raise BadInput(f"{error}; nothing else in {out} has changed") from error
     except OSError as error:  # the disk is full, the share is gone
         raise BadInput(f"{error}; the same command continues {out}") from error
@@ -210,23 +209,6 @@ def _players(
         return
     with model.players(out, say) as ready:
         yield ready
-
-
-@contextmanager
-def _locked(out: Path, manifest: CollectionManifest) -> Iterator[Collection]:
-    """The collection, for this process alone; a directory that cannot be used is bad input."""
-    from er_gym.data.collection import MANIFEST, PARTS, Collection
-    from er_gym.locking import exclusive_use
-
-    with entered(lambda: exclusive_use(out)):
-        try:
-            with bad_input():
-                collection = Collection.create(out, manifest)
-            yield collection
-        except BadInput:
-            if not (out / PARTS).exists():  # nothing has begun: the directory is free for another
-                (out / MANIFEST).unlink(missing_ok=True)
-            raise
 
 
 def _in_words(summary: CollectSummary, file: Path) -> str:

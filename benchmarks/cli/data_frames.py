@@ -53,7 +53,7 @@ def frames(
     """
     from er_gym.data.frame_camera import DrawingError, draw_frames, visits
     from er_gym.data.frames import FRAMES, FrameSet
-    from er_gym.locking import Locked, exclusive_use
+    from er_gym.locking import Locked
     from er_gym.rollout.worker_pool import WorkerSetupError
     from er_gym.writing import ForeignFile
 
@@ -61,8 +61,7 @@ def frames(
         camera, manifest, rooms = _plan(suite, scenes, width, height, out, seed)
         todo = visits(rooms, number, seed)
     try:
-        with bad_input(Locked, ForeignFile), exclusive_use(out):
-            frame_set = FrameSet.create(out, manifest)
+        with bad_input(Locked, ForeignFile), FrameSet.locked(out, manifest) as frame_set:
             _draw(draw_frames(frame_set, camera, todo, workers=workers), frame_set, todo, out)
             drawn = [each for visit in todo for each in frame_set.visit(visit.number)][:number]
             frame_set.write(drawn)

@@ -43,10 +43,10 @@ def import_(
     from benchmarks.cli.progress import counting
     from er_gym.data.sharegpt_files import open_sharegpt
     from er_gym.data.sharegpt_import import LEFT_OUT, import_sharegpt
-    from er_gym.writing import check_new_folder
+    from er_gym.writing import check_folder
 
     with bad_input():
-        check_new_folder(out)
+        check_folder(out)
         doing(f"reading {file}")
         opened = open_sharegpt(
             file,

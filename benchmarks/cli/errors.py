@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 CRASHED, STOPPED, INTERRUPTED = 1, 3, 130
 """Exit codes: episodes crashed; a budget or the server stopped the run; Ctrl-C. Bad input is 2."""
+T = TypeVar("T")
 
 
 class BadInput(click.ClickException):

@@ -26,7 +26,7 @@ from benchmarks.monitor.language import Translator
 from benchmarks.monitor.places import Place
 from benchmarks.monitor.run_view import RunSummary, Tally
 from benchmarks.plan.run import Plan, PlanRecord
-from er_gym.tasks.errors import TaskFileError
+from er_gym.tasks.errors import TaskFileError, first_problem
 from er_gym.tasks.reading import read_text
 
 _MAKERS: Mapping[str, tuple[type[BaseModel], Callable[[Any, Path], Plan]]] = {
@@ -128,8 +128,7 @@ def plan_view(place: Place, inside: Inside) -> tuple[PlanView, Any]:
         settings = model.model_validate(record.settings)
         phases = [(each.name, str(each), each.out) for each in make(settings, place.path).phases]
     except ValidationError as error:
-        first = error.errors()[0]
-        problem = f"{file.name}: {'.'.join(map(str, first['loc']))}: {first['msg']}"
+        problem = f"{file.name}: {first_problem(error)}"
     except (TaskFileError, ValueError, OSError) as error:
         problem = str(error).splitlines()[0]
     done = {each.name: each for each in record.done} if record else {}

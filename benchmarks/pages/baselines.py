@@ -39,7 +39,7 @@ from benchmarks.scoring.tables import Table, as_markdown
 from er_gym import __version__
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.outcomes import Outcomes
-from er_gym.rollout.run_directory import Manifest, RunDirectory, locked_run_directory
+from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.rollout.runner import run
 from er_gym.tasks import jsonl_format, load_suite
 from er_gym.tasks.task import Task
@@ -125,7 +125,7 @@ class Evaluator:
             seed=_SEED,
             er_gym=__version__,
         )
-        with locked_run_directory(
+        with RunDirectory.locked(
             self._work / f"{file_stem(name)}-{where}", manifest
         ) as run_directory:
             return self._play(run_directory, tasks, where, name)

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from benchmarks.plan.phase import Phase
 from benchmarks.plan.settings import FREE, PlaySettings
 from er_gym import __version__
 from er_gym.activity import begin
-from er_gym.locking import Locked, check_unused, exclusive_use
+from er_gym.locking import Locked, exclusive_use
 from er_gym.plugins import NotImported
+from er_gym.resumable import FolderKind
 from er_gym.rollout.processes import CONTEXT, GRACE_SECONDS, end_with_parent
-from er_gym.tasks.reading import read_text
 from er_gym.writing import make_folder, write_atomic
 
 Command = Callable[[Sequence[str]], None]
@@ -106,41 +106,38 @@ class PhaseFailed(Exception):
         self.phase, self.code = phase, code
 
 
-def read_record(plan: Plan, root: Path) -> PlanRecord | None:
-    """What a plan's directory says; None if it has not begun.
+def begun(plan: Plan, root: Path) -> PlanRecord:
+    """The record from which a plan goes on in a directory; one without phases if it begins.
 
     Raises:
-        PlanError: the file is damaged, or the directory holds something else.
+        FolderConflict: a setting differs that changes what comes out, the record is damaged, or
+            the directory holds something else.
     """
-    file = root / plan.file
-    if not file.exists():
-        if root.is_dir():
-            check_unused(root, file.name, PlanError)
-        return None
-    try:
-        record = PlanRecord.model_validate_json(read_text(file))
-    except ValidationError as error:
-        problem = error.errors()[0]
-        place = ".".join(map(str, problem["loc"]))
-        raise PlanError(f"{file} is damaged: {place}: {problem['msg']}") from None
-    if record.format != plan.format:
-        raise PlanError(f"{file} has the format {record.format!r:.80}, not {plan.format!r}")
-    return record
+    record = PlanRecord(
+        format=plan.format, settings=plan.settings.model_dump(mode="json"), er_gym=__version__
+    )
+    kind = FolderKind(
+        noun=plan.kind,
+        command=f"er-gym {plan.kind}",
+        manifest=plan.file,
+        model=PlanRecord,
+        parts=(),
+        holds_something=lambda path: True,  # how long phases have been tried
+        compared=_compared,
+    )
+    if kind.check(root, record):
+        return record
+    there = kind.read(root)
+    return record.model_copy(update={"done": there.done, "tried": there.tried})
 
 
-def check_same(plan: Plan, record: PlanRecord, root: Path) -> None:
-    """Refuse to run another plan in the same directory.
-
-    Raises:
-        PlanError: a setting differs that changes what comes out.
-    """
-    for name, value in plan.settings.model_dump(mode="json").items():
-        there = record.settings.get(name)
-        if name not in FREE and value != there:
-            raise PlanError(
-                f"{root} holds another {plan.kind}: its {name} is {there!r:.300}, this one's "
-                f"{value!r:.300}; choose another --out, or give the same settings"
-            )
+def _compared(there: PlanRecord, here: PlanRecord) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The settings that change what comes out; one that a version did not have was None there."""
+    names = [name for name in here.settings if name not in FREE]
+    return (
+        {"format": there.format} | {name: there.settings.get(name) for name in names},
+        {"format": here.format} | {name: here.settings[name] for name in names},
+    )
 
 
 def check_phases(phases: Iterable[Phase]) -> list[str]:
@@ -190,31 +187,24 @@ def run_plan(
         What the directory says in the end.
 
     Raises:
-        PlanError: the directory holds another plan, there is no phase ``until``, or the command of
-            a phase would refuse what it is given.
+        FolderConflict: the directory holds another plan.
+        PlanError: there is no phase ``until``, or the command of a phase would refuse what it is
+            given.
         Locked: another process runs it.
         PhaseFailed: a phase ended with an error.
         KeyboardInterrupt: after the running phase has ended.
         OSError: the directory cannot be written to.
     """
-    record = read_record(plan, root)
-    if record is not None:
-        check_same(plan, record, root)
+    done = {each.name for each in begun(plan, root).done}
     names = [phase.name for phase in plan.phases]
     if until is not None and until not in names:
         raise PlanError(f"there is no phase {until!r}; there are: {', '.join(names)}")
     asked = plan.phases if until is None else plan.phases[: names.index(until) + 1]
-    done = {each.name for each in record.done} if record else set()
     check_phases(phase for phase in asked if phase.name not in done)
     with exclusive_use(root):
         _wait_for_running(root)
-        record = PlanRecord(
-            format=plan.format,
-            settings=plan.settings.model_dump(mode="json"),
-            er_gym=__version__,
-            done=record.done if record else [],
-            tried=record.tried if record else {},
-        )
+        record = begun(plan, root)
+        done = {each.name for each in record.done}
         _write(root / plan.file, record)
         for number, phase in enumerate(plan.phases, 1):
             if phase.name not in done:

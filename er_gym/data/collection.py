@@ -22,11 +22,12 @@ from typing import Any, BinaryIO, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from er_gym.data.trajectory import Trajectory
-from er_gym.locking import LOCK, check_unused
-from er_gym.rollout.run_directory import EPISODES, RunDirectory, RunDirectoryError
-from er_gym.tasks.errors import TaskFileError
-from er_gym.tasks.reading import read_bytes, read_text
-from er_gym.writing import file_stem, inside, make_folder, replaced, write_atomic
+from er_gym.locking import LOCK
+from er_gym.resumable import FolderConflict, FolderKind, ResumableFolder, has_content
+from er_gym.rollout.run_directory import RUN, RunDirectory, RunDirectoryError
+from er_gym.tasks.errors import TaskFileError, first_problem
+from er_gym.tasks.reading import read_bytes
+from er_gym.writing import file_stem, inside, replaced
 
 MANIFEST = "collection.json"
 TRAJECTORIES = "trajectories.jsonl"
@@ -35,7 +36,7 @@ PLAYED = "trajectories"
 """The folder of a part that holds every trajectory as it was played."""
 
 
-class CollectionError(ValueError):
+class CollectionError(FolderConflict):
     """The directory cannot be used as a collection; the message says why and what to do."""
 
 
@@ -60,61 +61,28 @@ class CollectionManifest(BaseModel):
     er_gym: str
 
 
-class Collection:
-    """A collection, opened with :meth:`create` to add to it or :meth:`open` to read.
+def _holds_something(path: Path) -> bool:
+    """Whether there is more than a command leaves that is stopped before its first episode."""
+    held = {each.name for each in path.iterdir()} - {MANIFEST, TRAJECTORIES, PARTS, LOCK}
+    parts = (path / PARTS).glob("*")
+    return bool(held) or has_content(path / TRAJECTORIES) or any(map(RUN.holds_something, parts))
 
-    Attributes:
-        path: the directory.
-        manifest: what is collected.
-    """
 
-    def __init__(self, path: Path, manifest: CollectionManifest) -> None:
-        self.path = path
-        self.manifest = manifest
+COLLECTION = FolderKind(
+    noun="collection",
+    command="er-gym collect",
+    manifest=MANIFEST,
+    model=CollectionManifest,
+    parts=(TRAJECTORIES, PARTS),
+    holds_something=_holds_something,
+    error=CollectionError,
+)
 
-    @classmethod
-    def create(cls, path: Path, manifest: CollectionManifest) -> Collection:
-        """Start a collection in a directory, or continue it if it is the same.
 
-        Raises:
-            CollectionError: another collection, or something else, is there; nothing is changed.
-            OSError: the directory cannot be made or written to.
-        """
-        begun = (path / MANIFEST).exists()
-        if begun and not _is_bare(path):
-            theirs = cls.open(path).manifest.model_dump(mode="json")
-            ours = manifest.model_dump(mode="json")
-            if theirs != ours:
-                raise CollectionError(
-                    f"{path} holds another collection: {_difference(theirs, ours)}; choose "
-                    "another --out, or repeat that command"
-                )
-        else:
-            if not begun:
-                check_unused(path, MANIFEST, CollectionError)
-            make_folder(path)
-            write_atomic(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
-        return cls(path, manifest)
+class Collection(ResumableFolder[CollectionManifest]):
+    """A collection."""
 
-    @classmethod
-    def open(cls, path: Path) -> Collection:
-        """Open a collection to read it.
-
-        Raises:
-            CollectionError: there is none.
-        """
-        try:
-            text = read_text(path / MANIFEST)
-            return cls(path, CollectionManifest.model_validate_json(text))
-        except TaskFileError as error:
-            raise CollectionError(
-                f"{path} is not a collection of trajectories: {error}; give the directory that "
-                "was er-gym collect's --out"
-            ) from error
-        except ValidationError as error:
-            raise CollectionError(
-                f"{path / MANIFEST} is not a collection's manifest: {_first_problem(error)}"
-            ) from error
+    KIND = COLLECTION
 
     def part_path(self, part: str) -> Path:
         """The run directory of a part."""
@@ -145,7 +113,7 @@ class Collection:
         try:
             return Trajectory.model_validate_json(read_bytes(file))
         except (TaskFileError, ValidationError) as error:
-            raise CollectionError(f"{file}: {_first_problem(error)}") from error
+            raise CollectionError(f"{file}: {first_problem(error, 'the line')}") from error
 
     def has_pictures(self, trajectory: Trajectory) -> bool:
         """Whether all pictures of a trajectory are there."""
@@ -213,42 +181,4 @@ _ANEW = "the er-gym collect that made the collection writes the file anew"
 
 def damaged_line(place: str, error: ValidationError) -> CollectionError:
     """What to say of a line that is no trajectory."""
-    return CollectionError(f"{place}: {_first_problem(error)}; {_ANEW}")
-
-
-def _difference(theirs: Any, ours: Any, name: str = "") -> str:
-    """The first difference between two manifests, in words."""
-    if isinstance(theirs, dict) and isinstance(ours, dict):
-        for key in (*theirs, *ours):
-            if theirs.get(key, _ABSENT) != ours.get(key, _ABSENT):
-                inner = f"{name}.{key}" if name else str(key)
-                return _difference(theirs.get(key, _ABSENT), ours.get(key, _ABSENT), inner)
-    return f"its {name} is {theirs!r:.300}, this one's {ours!r:.300}"
-
-
-class _Absent:
-    def __repr__(self) -> str:
-        return "not given"
-
-
-_ABSENT = _Absent()
-
-
-def _is_bare(path: Path) -> bool:
-    """Whether a directory holds nothing that was collected, as after a command that was stopped
-    before its first episode. Another command may begin there."""
-    file = path / TRAJECTORIES
-    if {entry.name for entry in path.iterdir()} - {MANIFEST, TRAJECTORIES, PARTS, LOCK}:
-        return False
-    if file.is_symlink() or (file.exists() and not (file.is_file() and not file.stat().st_size)):
-        return False
-    return next((path / PARTS).glob(f"*/{EPISODES}/*"), None) is None
-
-
-def _first_problem(error: Exception) -> str:
-    """The first complaint of an exception, in one line."""
-    if not isinstance(error, ValidationError):
-        return " ".join(str(error).split())
-    first = error.errors(include_url=False, include_input=False)[0]
-    where = ".".join(map(str, first["loc"])) or "the line"
-    return f"{where}: {first['msg']}"
+    return CollectionError(f"{place}: {first_problem(error, 'the line')}; {_ANEW}")

@@ -20,7 +20,8 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from er_gym.data.trajectory import PictureRecord, SeenObject
-from er_gym.locking import check_unused
+from er_gym.resumable import FolderConflict, FolderKind, ResumableFolder, has_content
+from er_gym.tasks.errors import first_problem
 from er_gym.tasks.reading import read_bytes
 from er_gym.writing import make_folder, write_atomic
 
@@ -29,7 +30,7 @@ FRAMES = "frames.jsonl"
 VISITS, PICTURES = "visits", "pictures"
 
 
-class FramesError(ValueError):
+class FramesError(FolderConflict):
     """The directory cannot be used for frames; the message says why and what to do."""
 
 
@@ -94,56 +95,21 @@ class FramesManifest(_Record):
 _VISIT = TypeAdapter(list[Frame])
 
 
-class FrameSet:
-    """A directory of frames, opened with :meth:`create` to add to it or :meth:`open` to read.
+FRAME_SET = FolderKind(
+    noun="folder of frames",
+    command="er-gym data frames",
+    manifest=MANIFEST,
+    model=FramesManifest,
+    parts=(FRAMES, VISITS, PICTURES),
+    holds_something=lambda path: has_content(path / VISITS) or has_content(path / FRAMES),
+    error=FramesError,
+)
 
-    Attributes:
-        path: the directory.
-        manifest: what is drawn.
-    """
 
-    def __init__(self, path: Path, manifest: FramesManifest) -> None:
-        self.path, self.manifest = path, manifest
+class FrameSet(ResumableFolder[FramesManifest]):
+    """A directory of frames."""
 
-    @classmethod
-    def create(cls, path: Path, manifest: FramesManifest) -> FrameSet:
-        """Start in a directory, or continue there if the same is drawn.
-
-        Raises:
-            FramesError: something else is there; nothing is changed.
-        """
-        if (path / MANIFEST).exists():
-            theirs = cls.open(path).manifest
-            for name in FramesManifest.model_fields:
-                there, here = getattr(theirs, name), getattr(manifest, name)
-                if there != here:
-                    raise FramesError(
-                        f"{path} holds other frames: its {name} is {there!r:.200}, this one's "
-                        f"{here!r:.200}; choose another --out, or repeat that command"
-                    )
-        else:
-            check_unused(path, MANIFEST, FramesError)
-            make_folder(path)
-            write_atomic(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
-        return cls(path, manifest)
-
-    @classmethod
-    def open(cls, path: Path) -> FrameSet:
-        """Open a directory of frames.
-
-        Raises:
-            FramesError: there is none.
-            TaskFileError: its manifest cannot be read.
-        """
-        try:
-            manifest = FramesManifest.model_validate_json(read_bytes(path / MANIFEST))
-        except ValidationError as error:
-            problem = error.errors()[0]
-            where = ".".join(map(str, problem["loc"]))
-            raise FramesError(
-                f"{path / MANIFEST} is no manifest of frames: {where}: {problem['msg']}"
-            ) from None
-        return cls(path, manifest)
+    KIND = FRAME_SET
 
     def has_visit(self, number: int) -> bool:
         """Whether a visit is whole."""
@@ -165,7 +131,7 @@ class FrameSet:
             return _VISIT.validate_json(read_bytes(file))
         except ValidationError as error:
             raise FramesError(
-                f"{file} is damaged: {error.errors()[0]['msg']}; remove it and draw again"
+                f"{file} is damaged: {first_problem(error)}; remove it and draw again"
             ) from None
 
     def write(self, frames: Sequence[Frame]) -> None:
@@ -190,8 +156,8 @@ class FrameSet:
                     yield Frame.model_validate_json(line)
                 except ValidationError as error:
                     raise FramesError(
-                        f"{file}:{number}: {error.errors()[0]['msg']}; remove the file and draw "
-                        "again"
+                        f"{file}:{number}: {first_problem(error, 'the line')}; remove the file and "
+                        "draw again"
                     ) from None
 
     def _visit(self, number: int) -> Path:

@@ -14,7 +14,7 @@ Where a task is played several times, the files of a later episode are named
 An agent may leave other files beside the records (:class:`.agent.LeavesAttachments`). A file is
 written under a temporary name and then moved, so each file is whole. Readers ignore the temporary
 files of a killed run. The same run continues where it stopped: :meth:`RunDirectory.read` returns
-the episodes it has. One process at a time plays in a directory (:func:`locked_run_directory`).
+the episodes it has. One process at a time plays in a directory (:meth:`RunDirectory.locked`).
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from er_gym.envs.protocol import DEFAULT
-from er_gym.locking import check_kind, exclusive_use
+from er_gym.resumable import FolderConflict, FolderKind, ResumableFolder, has_content
 from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.events import EVENTS
 from er_gym.rollout.play import episode_seed
 from er_gym.rollout.records import EpisodeRecord
-from er_gym.tasks.errors import SetAsideTask, Substitution, TaskFileError
-from er_gym.tasks.reading import read_bytes, read_text
+from er_gym.tasks.errors import SetAsideTask, Substitution, TaskFileError, first_problem
+from er_gym.tasks.reading import read_bytes
 from er_gym.writing import file_stem, make_folder, write_atomic
 
 MANIFEST = "run.json"
@@ -50,13 +50,9 @@ REPLIES = "replies"
 _DATABASE = "cache.db"
 """The file of diskcache in the folder of replies."""
 SERVER_EVENTS = "server-events.jsonl"
-_KEPT = (EPISODES, CONVERSATIONS, PICTURES, SPENDING, SERVER_EVENTS, REPLIES, EVENTS)
-"""The files and folders of a run directory beside its manifest."""
-_LOST_WITH_IT = (EPISODES, SPENDING, REPLIES)
-"""A run is worth keeping if one of these holds something."""
 
 
-class RunDirectoryError(ValueError):
+class RunDirectoryError(FolderConflict):
     """The directory cannot be used for this run; the message says why and what to do."""
 
 
@@ -134,74 +130,60 @@ class RunContents:
     unusable: tuple[UnusableFile, ...]
 
 
-class RunDirectory:
-    """A run directory, opened with :meth:`create` to play or :meth:`open` to read.
+def _compared(there: Manifest, here: Manifest) -> tuple[dict[str, Any], dict[str, Any]]:
+    """All of both, the protocol first: where it differs, that tells the most."""
+    protocols = {"protocol": there.protocol}, {"protocol": here.protocol}
+    return protocols[0] | there.model_dump(mode="json"), protocols[1] | here.model_dump(mode="json")
 
-    Attributes:
-        path: the directory.
-        manifest: the manifest of its run.
-    """
+
+RUN = FolderKind(
+    noun="run",
+    command="er-gym bench",
+    manifest=MANIFEST,
+    model=Manifest,
+    parts=(EPISODES, CONVERSATIONS, PICTURES, SPENDING, SERVER_EVENTS, REPLIES, EVENTS),
+    holds_something=lambda path: has_content(path / EPISODES) or _has_replies(path),
+    shared=True,
+    compared=_compared,
+    error=RunDirectoryError,
+)
+
+
+class RunDirectory(ResumableFolder[Manifest]):
+    """A run directory."""
+
+    KIND = RUN
 
     def __init__(self, path: Path, manifest: Manifest) -> None:
-        self.path = path
-        self.manifest = manifest
+        super().__init__(path, manifest)
         self._digest = manifest.digest
 
     @classmethod
-    def create(cls, path: Path, manifest: Manifest) -> RunDirectory:
-        """Start a run in a directory, or continue it if it is the same run.
+    @contextlib.contextmanager
+    def locked(cls, path: Path, manifest: Manifest) -> Iterator[RunDirectory]:
+        """A run directory to play in, locked against other processes.
+
+        If the block raises before there is anything to lose, a run that began here is removed
+        (:meth:`er_gym.resumable.FolderKind.locked`). Episodes that crashed because the model
+        refused are nothing to lose: they tell no more than the error.
 
         Raises:
+            Locked: another process plays in it.
             RunDirectoryError: another run's results are there; nothing is changed.
             OSError: the directory cannot be made or written to.
         """
-        if (path / MANIFEST).exists():
-            other = cls.open(path).manifest
-            if other.protocol != manifest.protocol:
-                raise RunDirectoryError(
-                    f"{path} holds a run under the {other.protocol} protocol, not the "
-                    f"{manifest.protocol} one; choose another --out, or continue that run with "
-                    f"--protocol {other.protocol}"
-                )
-            theirs = other.model_dump(mode="json")
-            for name, here in manifest.model_dump(mode="json").items():
-                there = theirs[name]
-                if there != here:
-                    part, old, new = first_difference(name, there, here)
-                    raise RunDirectoryError(
-                        f"{path} holds another run: its {part} is {old!r}, this one's {new!r}; "
-                        "choose another --out, or start that run again as it was"
-                    )
-        elif there := [name for name in _KEPT if _holds_something(path / name)]:
-            raise RunDirectoryError(
-                f"{path} holds {there[0]} but no {MANIFEST} that says which run it is; "
-                "choose another --out"
-            )
-        else:
-            check_kind(path, MANIFEST, RunDirectoryError)
-            make_folder(path / EPISODES)
-            write_atomic(path / MANIFEST, manifest.model_dump_json(indent=2) + "\n")
-        return cls(path, manifest)
-
-    @classmethod
-    def open(cls, path: Path) -> RunDirectory:
-        """Open a run directory to read it.
-
-        Raises:
-            RunDirectoryError: the directory holds no run.
-        """
-        try:
-            text = read_text(path / MANIFEST)
-        except TaskFileError as error:
-            raise RunDirectoryError(
-                f"{path} is not a run directory: {error}; give the --out directory of er-gym bench"
-            ) from error
-        try:
-            return cls(path, Manifest.model_validate_json(text))
-        except ValidationError as error:
-            raise RunDirectoryError(
-                f"{path / MANIFEST} is not a run manifest: {_first_problem(error)}"
-            ) from error
+        with RUN.locked(path, manifest) as begins:
+            directory = cls(path, manifest)
+            try:
+                yield directory
+            except CannotGoOn:
+                if (
+                    begins
+                    and not _has_replies(path)
+                    and all(one.error for one in directory.episodes())
+                ):
+                    shutil.rmtree(path / EPISODES, ignore_errors=True)
+                raise
 
     def write(self, episode: EpisodeRecord) -> Path:
         """Write an episode; it replaces an earlier one of the same task and sample."""
@@ -244,22 +226,15 @@ class RunDirectory:
 
     def read(self) -> RunContents:
         """All episodes, and the unusable files among them: broken, copied or foreign."""
-        episodes, unusable = [], []
-        for path in sorted((self.path / EPISODES).glob("*.json")):
-            try:
-                episodes.append(self._episode(path))
-            except ValueError as error:
-                unusable.append(UnusableFile(path, str(error)))
-        return RunContents(tuple(episodes), tuple(unusable))
+        found = [*self._files()]
+        return RunContents(
+            tuple(each for each in found if isinstance(each, EpisodeRecord)),
+            tuple(each for each in found if isinstance(each, UnusableFile)),
+        )
 
     def episodes(self) -> Iterator[EpisodeRecord]:
         """All episodes of this run, sorted by file name; each is read when it is asked for."""
-        for path in sorted((self.path / EPISODES).glob("*.json")):
-            try:
-                episode = self._episode(path)
-            except ValueError:
-                continue
-            yield episode
+        return (each for each in self._files() if isinstance(each, EpisodeRecord))
 
     def episode(self, key: str) -> EpisodeRecord:
         """One episode of this run.
@@ -294,15 +269,12 @@ class RunDirectory:
             told.append(f"{self.path / str(one)}; {then}")
         return told
 
-    def _withdraw(self) -> None:
-        """Remove the run, the manifest last: a kill meanwhile then leaves a valid run directory."""
-        for name in _KEPT:
-            path = self.path / name
-            if path.is_dir() and not path.is_symlink():
-                shutil.rmtree(path, ignore_errors=True)
-            else:
-                path.unlink(missing_ok=True)
-        (self.path / MANIFEST).unlink()
+    def _files(self) -> Iterator[EpisodeRecord | UnusableFile]:
+        for path in sorted((self.path / EPISODES).glob("*.json")):
+            try:
+                yield self._episode(path)
+            except ValueError as error:
+                yield UnusableFile(path, str(error))
 
     def _file(self, key: str) -> Path:
         return self.path / EPISODES / f"{file_stem(key)}.json"
@@ -314,7 +286,7 @@ class RunDirectory:
         try:
             episode = EpisodeRecord.model_validate_json(read_bytes(path))
         except ValidationError as error:
-            raise ValueError(f"broken: {_first_problem(error)}") from None
+            raise ValueError(f"broken: {first_problem(error)}") from None
         except TaskFileError as error:
             raise ValueError(f"it cannot be read: {error}") from None
         name = self._file(episode.key).name
@@ -332,78 +304,16 @@ class RunDirectory:
         return episode.model_copy(update={"run": ""})
 
 
-@contextlib.contextmanager
-def locked_run_directory(path: Path, manifest: Manifest) -> Iterator[RunDirectory]:
-    """A run directory to play in, locked against other processes.
-
-    If the block raises before there is anything to lose (an episode that did not crash, a reply
-    that was paid for), a run that began here is removed. A mistyped command thus does not block the
-    corrected one. A run that was killed that early is replaced, too.
-
-    Raises:
-        Locked: another process plays in it.
-        RunDirectoryError: another run's results are there; nothing is changed.
-        OSError: the directory cannot be made or written to.
-    """
-    with exclusive_use(path):
-        if (path / MANIFEST).exists():
-            begun = RunDirectory.open(path)
-            if not any(map(_holds_something, (path / name for name in _LOST_WITH_IT))):
-                begun._withdraw()
-        new = not (path / MANIFEST).exists()
-        try:
-            run_directory = RunDirectory.create(path, manifest)
-        except OSError:  # a full disk
-            with contextlib.suppress(OSError):
-                (path / EPISODES).rmdir()
-            raise
-        try:
-            yield run_directory
-        except BaseException as error:  # Ctrl-C too
-            paid = _holds_something(path / SPENDING)
-            # Episodes that crashed because the model refused tell no more than the error.
-            refused = isinstance(error, CannotGoOn)
-            if new and not paid and all(one.error and refused for one in run_directory.episodes()):
-                run_directory._withdraw()
-            raise
-
-
-def first_difference(name: str, one: Any, other: Any) -> tuple[str, Any, Any]:
-    """The first place in which two values of a setting differ: ``env.faults``, and both values.
-
-    What only one of two tables has is None in the other.
-    """
-    if isinstance(one, dict) and isinstance(other, dict):
-        for key in [*one, *(key for key in other if key not in one)]:
-            if one.get(key) != other.get(key):
-                return first_difference(f"{name}.{key}", one.get(key), other.get(key))
-    return name, one, other
-
-
-def _first_problem(error: ValidationError) -> str:
-    """The first problem that pydantic found, in one line."""
-    first = error.errors(include_url=False, include_input=False)[0]
-    where = ".".join(map(str, first["loc"])) or "the file"
-    return f"{where}: {first['msg']}"
-
-
-def _holds_something(path: Path) -> bool:
-    """Whether a file has content, a folder has files, or the folder of replies has a reply."""
-    if path.is_dir():
-        there = any(path.iterdir())
-        return there and not (path.name == REPLIES and _has_no_rows(path / _DATABASE))
-    return path.exists() and path.stat().st_size > 0
-
-
-def _has_no_rows(file: Path) -> bool:
-    """Whether the database of replies is empty, as before the first reply; False if unknown."""
+def _has_replies(path: Path) -> bool:
+    """Whether a run directory holds replies that were paid for or are kept."""
+    if has_content(path / SPENDING):
+        return True
+    file = (path / REPLIES / _DATABASE).absolute()  # it is made before the first reply
     try:
-        with contextlib.closing(
-            sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)
-        ) as database:
-            return database.execute("SELECT 1 FROM Cache LIMIT 1").fetchone() is None
-    except (sqlite3.Error, ValueError):
-        return False
+        with contextlib.closing(sqlite3.connect(f"{file.as_uri()}?mode=ro", uri=True)) as database:
+            return database.execute("SELECT 1 FROM Cache LIMIT 1").fetchone() is not None
+    except sqlite3.Error:
+        return has_content(path / REPLIES)
 
 
 def _free_name(path: Path) -> Path:

@@ -1,15 +1,31 @@
-"""Problems of task files: the error, tasks that are set aside, ids that are substituted."""
+"""Problems of files: the errors, tasks that are set aside, ids that are substituted."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from pydantic import ValidationError
+
 _NAMED = 3
 
 
 class TaskFileError(ValueError):
     """A task file cannot be used; the message is one line that names the file and the place."""
+
+
+def first_problem(error: Exception, whole: str = "the file") -> str:
+    """An error in one line; of what pydantic found, the first with its place.
+
+    Args:
+        error: any.
+        whole: what is named if the data as a whole are wrong, such as no JSON.
+    """
+    if not isinstance(error, ValidationError):
+        return " ".join(str(error).split())
+    first = error.errors(include_url=False, include_input=False)[0]
+    where = ".".join(map(str, first["loc"])) or whole
+    return f"{where}: {' '.join(first['msg'].removeprefix('Value error, ').split())}"
 
 
 @dataclass(frozen=True)

@@ -281,7 +281,7 @@ BAD = {
     "empty name": Bad({"out": ""}, "'--out': an empty name"),
     "a file": Bad({"out": __file__}, "is a file"),
     "not empty": Bad({"out": ROOT / "docs"}, "is not empty and holds no collection.json; choose"),
-    "no run": Bad({"correct": ROOT / "docs"}, "docs is not a run directory"),
+    "no run": Bad({"correct": ROOT / "docs"}, "docs is no run: "),
 }
 
 
@@ -323,7 +323,7 @@ def test_a_part_of_a_collection_is_no_place_for_another(collected: Path, er_gym:
     part = collected / "parts" / "imitation"
     code, _, err = er_gym("collect", "--out", part, *PLAIN, "--limit", 1)
     assert code == 2
-    assert "is not empty and holds no collection.json" in err
+    assert "is a run (it holds run.json); choose another --out" in err
     assert not (part / "collection.json").exists()
 
 

@@ -145,8 +145,8 @@ def as_it_is(path: Path) -> None:
 
 
 BAD = {
-    "no collection": (("stats", "."), as_it_is, "is not a collection of trajectories"),
-    "nothing there": (("verify", "none"), as_it_is, "is not a collection of trajectories"),
+    "no collection": (("stats", "."), as_it_is, "is no collection: "),
+    "nothing there": (("verify", "none"), as_it_is, "is no collection: "),
     "empty": (("stats", "x"), empty, "x holds no trajectory yet"),
     "empty to show": (("show", "x", "--trajectory", "a"), empty, "x holds no trajectory yet"),
     "empty to verify": (("verify", "x"), empty, "x holds no trajectory yet"),
@@ -180,7 +180,7 @@ BAD = {
     "a pipe": (("stats", "x"), pipe, "cannot be read (not a regular file)"),
     "a pipe to verify": (("verify", "x"), pipe, "cannot be read (not a regular file)"),
     "other tasks": (("verify", "x"), other_digest, "are not those that x was played in"),
-    "damaged part": (("verify", "x"), damaged_part, "is not a run manifest"),
+    "damaged part": (("verify", "x"), damaged_part, "is no run: "),
     "unwritten": (("stats", "x"), unwritten, "trajectories.jsonl cannot be read"),
     "cut": (("stats", "x"), cut, "trajectories.jsonl:8: "),
     "cut to verify": (("verify", "x"), cut, "trajectories.jsonl:8: "),

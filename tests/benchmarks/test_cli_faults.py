@@ -62,7 +62,7 @@ def test_without_faults_a_manifest_does_not_speak_of_them(er_gym: ErGym, tmp_pat
     # A run with faults is another run.
     code, _, err = er_gym(*bench("--limit", 1, "--faults", 0.1, "--out", out))
     assert code == 2
-    assert "holds another run: its env.faults is None, this one's 0.1" in err
+    assert "holds another run: its env.faults is not given, this one's 0.1" in err
 
 
 @pytest.mark.parametrize("rates", ["2", "fly=0.1", "open=", "open=0.1,open=0.2", ""])

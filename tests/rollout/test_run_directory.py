@@ -16,7 +16,6 @@ from er_gym.rollout.run_directory import (
     REPLIES,
     RunDirectory,
     RunDirectoryError,
-    locked_run_directory,
 )
 from er_gym.writing import file_stem
 
@@ -126,7 +125,10 @@ def test_tuples_do_not_make_another_run(tmp_path, manifest):
         ("er_gym", "0.2.0"),
     ],
 )
-def test_another_run_is_refused_by_the_field_that_differs(run_directory, manifest, field, value):
+def test_another_run_is_refused_by_the_field_that_differs(
+    run_directory, manifest, episode, field, value
+):
+    run_directory.write(episode(("end",), ("end",)))
     before = (run_directory.path / "run.json").read_bytes()
     name, _, key = field.partition(".")
     change = {name: {**manifest.env, key: value} if key else value}
@@ -144,13 +146,13 @@ def test_episodes_of_unknown_origin_are_refused(run_directory, manifest, episode
 
 
 def test_what_is_no_run(tmp_path, run_directory):
-    with pytest.raises(RunDirectoryError, match="is not a run directory"):
+    with pytest.raises(RunDirectoryError, match=r"nowhere is no run: .*run\.json: no such file"):
         RunDirectory.open(tmp_path / "nowhere")
     (run_directory.path / "run.json").write_text('{"format": "er-gym/run/1"}')
-    with pytest.raises(RunDirectoryError, match="is not a run manifest: suite: Field required"):
+    with pytest.raises(RunDirectoryError, match=r"is no run: .*run\.json: suite: Field required"):
         RunDirectory.open(run_directory.path)
     (run_directory.path / "run.json").write_text("{")
-    with pytest.raises(RunDirectoryError, match="is not a run manifest: the file: Invalid JSON"):
+    with pytest.raises(RunDirectoryError, match=r"is no run: .*run\.json: the file: Invalid JSON"):
         RunDirectory.open(run_directory.path)
 
 
@@ -237,7 +239,7 @@ def test_it_is_moved_out_of_the_way_and_not_lost(run_directory, odd_files, episo
 def test_a_start_that_is_refused_claims_nothing(tmp_path, manifest):
     with (
         pytest.raises(ValueError, match="no such model"),
-        locked_run_directory(tmp_path / "a" / "x", manifest),
+        RunDirectory.locked(tmp_path / "a" / "x", manifest),
     ):
         raise ValueError("no such model")
     assert list(tmp_path.iterdir()) == []
@@ -245,20 +247,20 @@ def test_a_start_that_is_refused_claims_nothing(tmp_path, manifest):
 
 def test_what_was_there_before_stays(tmp_path, run_directory, manifest, episode):
     (tmp_path / "run" / "notes.md").write_text("mine")
-    with pytest.raises(KeyboardInterrupt), locked_run_directory(run_directory.path, manifest):
+    with pytest.raises(KeyboardInterrupt), RunDirectory.locked(run_directory.path, manifest):
         raise KeyboardInterrupt
     assert [path.name for path in run_directory.path.iterdir()] == ["notes.md"]
     for error in ("", "ValueError: no"):
-        with locked_run_directory(run_directory.path, manifest) as mine:
+        with RunDirectory.locked(run_directory.path, manifest) as mine:
             mine.write(episode(("end",), (), error=error))
-        with pytest.raises(KeyboardInterrupt), locked_run_directory(run_directory.path, manifest):
+        with pytest.raises(KeyboardInterrupt), RunDirectory.locked(run_directory.path, manifest):
             raise KeyboardInterrupt
         assert len(list(RunDirectory.open(run_directory.path).episodes())) == 1
 
 
 def test_a_run_killed_before_it_had_anything_gives_way(run_directory, manifest):
     other = manifest.model_copy(update={"agent": "random"})
-    with locked_run_directory(run_directory.path, other):
+    with RunDirectory.locked(run_directory.path, other):
         pass
     assert RunDirectory.open(run_directory.path).manifest == other
 
@@ -267,10 +269,10 @@ def test_what_was_paid_for_stays(run_directory, manifest):
     (run_directory.path / "spending.jsonl").write_text("{}\n")
     with (
         pytest.raises(RunDirectoryError, match="its agent is"),
-        locked_run_directory(run_directory.path, manifest.model_copy(update={"agent": "random"})),
+        RunDirectory.locked(run_directory.path, manifest.model_copy(update={"agent": "random"})),
     ):
         pass
-    with pytest.raises(KeyboardInterrupt), locked_run_directory(run_directory.path, manifest):
+    with pytest.raises(KeyboardInterrupt), RunDirectory.locked(run_directory.path, manifest):
         raise KeyboardInterrupt
     assert (run_directory.path / "run.json").exists()
 
@@ -296,9 +298,9 @@ def test_another_kind_of_folder_is_left_alone(tmp_path, manifest):
 
 def test_two_do_not_play_in_one_directory(run_directory, manifest):
     with (
-        locked_run_directory(run_directory.path, manifest),
+        RunDirectory.locked(run_directory.path, manifest),
         pytest.raises(Locked, match=f"in use by process {os.getpid()};"),
-        locked_run_directory(run_directory.path, manifest),
+        RunDirectory.locked(run_directory.path, manifest),
     ):
         pass
 
@@ -310,7 +312,7 @@ def test_an_empty_folder_of_replies_is_nothing_to_keep(run_directory, manifest):
     with closing(sqlite3.connect(file)) as database:
         database.execute("CREATE TABLE Cache (key TEXT)")
     other = manifest.model_copy(update={"agent": "openai:right"})
-    with locked_run_directory(run_directory.path, other) as again:
+    with RunDirectory.locked(run_directory.path, other) as again:
         assert again.manifest == other
         file.parent.mkdir(exist_ok=True)
         with closing(sqlite3.connect(file)) as database:
@@ -319,7 +321,7 @@ def test_an_empty_folder_of_replies_is_nothing_to_keep(run_directory, manifest):
             database.commit()
     with (
         pytest.raises(RunDirectoryError, match="its agent is"),
-        locked_run_directory(run_directory.path, manifest),
+        RunDirectory.locked(run_directory.path, manifest),
     ):
         pass
 
@@ -336,12 +338,12 @@ def test_half_a_character_of_an_agent_is_kept_as_its_escape(run_directory, episo
 def test_a_disk_that_is_full_at_the_start_leaves_nothing(tmp_path, manifest):
     code = (
         "import resource, signal, sys\n"
-        "from er_gym.rollout.run_directory import Manifest, locked_run_directory\n"
+        "from er_gym.rollout.run_directory import Manifest, RunDirectory\n"
         "from pathlib import Path\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (64, 64))\n"
         "manifest = Manifest.model_validate_json(sys.argv[2])\n"
-        "with locked_run_directory(Path(sys.argv[1]), manifest): pass\n"
+        "with RunDirectory.locked(Path(sys.argv[1]), manifest): pass\n"
     )
     out = tmp_path / "run"
     command = [sys.executable, "-c", code, out, manifest.model_dump_json()]

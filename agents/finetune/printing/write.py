@@ -14,7 +14,7 @@ from agents.finetune.printing.sources import Facts, PicturesToTokens, look_at, o
 from agents.finetune.printing.trl import TRL
 from agents.finetune.settings import FinetuneSettings
 from er_gym.data.trajectory import PictureRecord
-from er_gym.writing import check_new_folder, whole_folder, write_atomic
+from er_gym.writing import check_folder, whole_folder, write_atomic
 
 PROGRAMS: dict[str, Program] = {row.name: row for row in (LLAMA_FACTORY, MS_SWIFT, TRL, DEEPSPEED)}
 """All programs by name."""
@@ -61,7 +61,7 @@ def write_files(
     if settings.training.optimizer != "adamw":
         raise ValueError(f"{program} cannot learn with training.optimizer=muon; set adamw")
     chosen = choose_model(model)
-    check_new_folder(out)
+    check_folder(out)
     count = gpus or (LORA_GPUS if settings.model.lora else FULL_GPUS)
     source = open_source(data, settings.data)
     facts = look_at(source, _counter(chosen, settings))

@@ -14,6 +14,7 @@ from agents.vlm.chat import Message, Picture, Reply, Usage
 from agents.vlm.clients.tokens import ReportedUsage, RequestSize, usage_of
 from agents.vlm.clients.tolerant_model import OrNone, TolerantModel
 from agents.vlm.settings import Prices
+from er_gym.tasks.errors import first_problem
 
 _LONGEST_WORD = 200  # characters of a model's name, or of why it stopped
 _LONGEST_ERROR = 100_000  # bytes of an error that are read
@@ -128,9 +129,8 @@ def read_completion(body: bytes) -> Completion:
     try:
         return Completion.model_validate_json(body)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        where = ".".join(map(str, first["loc"])) or "the body"
-        raise ValueError(f"{where}: {first['msg']}; it says: {error_text(body)}") from None
+        problem = first_problem(error, "the body")
+        raise ValueError(f"{problem}; it says: {error_text(body)}") from None
 
 
 def read_billing(body: bytes) -> Billing:

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from agents.vlm.chat import LEFT_OUT, Message, ModelError, Picture, Reply
 from agents.vlm.record import ConversationRecord, PictureRecord
-from er_gym.tasks.errors import TaskFileError
+from er_gym.tasks.errors import TaskFileError, first_problem
 from er_gym.tasks.reading import read_bytes
 from er_gym.writing import file_stem
 
@@ -133,21 +133,14 @@ def _read(file: Path, agent: str | None) -> ConversationRecord:
     try:
         kept = ConversationRecord.model_validate_json(read_bytes(file))
     except (TaskFileError, ValidationError) as error:
-        problem = str(error) if isinstance(error, TaskFileError) else _first_problem(error)
-        raise ValueError(f"{file} cannot be read as a conversation: {problem}") from None
+        told = first_problem(error)
+        raise ValueError(f"{file} cannot be read as a conversation: {told}") from None
     name = f"{file_stem(kept.task_id)}.json"
     if agent is not None and file.name != name:
         raise ValueError(f"{file} is a copy: it holds the conversation of {name}")
     if agent and kept.agent != agent:
         raise ValueError(f"{file} is of another run: its agent is {kept.agent!r}, not {agent!r}")
     return kept
-
-
-def _first_problem(error: ValidationError) -> str:
-    """Pydantic's first complaint, in one line."""
-    first = error.errors(include_url=False, include_input=False)[0]
-    where = ".".join(map(str, first["loc"])) or "the file"
-    return f"{where}: {first['msg']}"
 
 
 def _replies(kept: ConversationRecord) -> Mapping[str, Reply]:

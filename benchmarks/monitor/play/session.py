@@ -29,7 +29,7 @@ from er_gym.rollout.agent import (
 from er_gym.rollout.events import EpisodeEnded, Event
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.records import PERSON, EpisodeRecord
-from er_gym.rollout.run_directory import RunDirectory, locked_run_directory
+from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.runner import episodes_of, finished, run
 from er_gym.tasks.task import Task
 
@@ -231,7 +231,7 @@ class Session:
     def _play(self) -> None:
         plan, why = self.plan, ""
         try:
-            with locked_run_directory(plan.path, plan.manifest) as directory:
+            with RunDirectory.locked(plan.path, plan.manifest) as directory:
                 directory.move_aside(episodes_of(plan.tasks))
                 with plan.cast(directory) as cast:
                     self._run(directory, cast)

@@ -31,7 +31,7 @@ from er_gym.data.exports.verl import VERL
 from er_gym.plugins import Registry
 from er_gym.tasks import splits
 from er_gym.thor import SCENE_NAMES
-from er_gym.writing import MARKDOWN_MARK, check_new_folder, whole_folder, write_atomic
+from er_gym.writing import MARKDOWN_MARK, check_folder, whole_folder, write_atomic
 
 EXPORTS: Registry[ExportFormat] = Registry(
     kind="export format",
@@ -78,7 +78,7 @@ def export(
     options = options or ExportOptions()
     row = EXPORTS.get(format)
     dialect = load_dialect(options.dialect)
-    check_new_folder(out)
+    check_folder(out)
     scenes = _count_rooms(collection)
     held_out = _held_out(scenes, options.held_out)
     with whole_folder(out) as draft:

@@ -392,7 +392,7 @@ def test_bad_input_is_told_in_a_line(run: Path, collected: Path, tmp_path: Path)
         (path / "run.json").write_text(json.dumps({**manifest, "env": env, **changes}))
         return path
 
-    assert "is not a run directory" in select("--select", collected)
+    assert "is no run: " in select("--select", collected)
     assert "no episode can be taken (none of these tasks)" in select("--select", other("empty"))
     assert "other tasks than those of mini" in select(
         "--select", other("suite", suite_digest="0" * 64)

@@ -22,7 +22,7 @@ from test_tokens import by_hand
 from agents.finetune import loop, run_files
 from agents.finetune import train as training
 from agents.finetune.model_files import open_model
-from agents.finetune.run_files import RunFiles
+from agents.finetune.run_files import FINETUNING, FinetuneManifest, RunFiles
 from agents.finetune.samples import open_samples
 from agents.finetune.settings import STAGES, FinetuneSettings, load_settings
 from agents.finetune.tokens import FEEDBACK, Encoder
@@ -369,12 +369,36 @@ def test_memory_that_is_not_there_is_told_before_loading(
             train(made, models("qwen2"), [blind.path], tmp_path / "run")
     assert not (tmp_path / "run").exists()
     train(made, models("qwen2"), [blind.path], tmp_path / "run", ignore_memory=True)
-    with pytest.raises(ValueError, match=r"holds another run \(training.epochs was 1.0, now 2.0\)"):
+    with pytest.raises(
+        ValueError, match=r"another fine-tuning run: its training.epochs is 1.0, th"
+    ):
         train(settings("training.epochs=2"), models("qwen2"), [blind.path], tmp_path / "run")
     limited = settings("training.epochs=1", "data.limit=3")
-    with pytest.raises(ValueError, match=r"data.limit was None, now 3, the data was .* other cont"):
+    with pytest.raises(
+        ValueError, match=r"its data.limit is not given, this one's 3 .*: data_digest\)"
+    ):
         train(limited, models("qwen2"), [blind.path], tmp_path / "run")
     assert (
         json.loads((tmp_path / "run/finetune.json").read_text())["settings"]["data"]["limit"]
         is None
     )
+
+
+def test_a_path_may_change_where_the_content_is_the_same() -> None:
+    """And what a version before did not write, such as a setting that is None."""
+    told = {
+        "settings": {"data": {"limit": None}, "model": {}}, "model": "/m", "model_digest": "1",
+        "data": ["/d"], "data_digest": "2", "er_gym": "0",
+    }  # fmt: skip
+    there = FinetuneManifest.model_validate(told)
+
+    def same(**changes: Any) -> bool:
+        here = FinetuneManifest.model_validate({**told, **changes})
+        one, other = FINETUNING.compared(there, here)
+        return one == other
+
+    assert same(model="/elsewhere", data=["/x"], er_gym="1")
+    assert same(settings={"data": {}, "model": {"new": None}})
+    assert not same(settings={"data": {"limit": 3}, "model": {}})
+    assert not same(model_digest="3")
+    assert not same(data_digest="3")

@@ -22,7 +22,7 @@ from agents.rl.agent import RLAgent
 from agents.rl.config import EnvConfig, Network, TrainConfig, VecEnvConfig
 from agents.rl.envs import make_env
 from agents.rl.model_file import save
-from agents.rl.train import ALGORITHMS, load_last_checkpoint, prepare_run
+from agents.rl.train import ALGORITHMS, TRAINING, load_last_checkpoint
 from er_gym.envs.actions import INDEX
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks.suites import load_suite
@@ -149,7 +149,7 @@ def test_learning_stays_finite(env: VecEnv, name: str) -> None:
 def test_a_loaded_model_acts_alike(env: VecEnv, name: str, tmp_path: Path) -> None:
     model = learner(env, name)
     model.learn(60, log_interval=None)
-    prepare_run(configured(name), tmp_path)
+    TRAINING.begin(tmp_path, configured(name))
     save(model, tmp_path)
     loaded = load_last_checkpoint(tmp_path)
     rows = slice(0, model.replay_buffer.pos)
@@ -162,7 +162,7 @@ def test_a_loaded_model_acts_alike(env: VecEnv, name: str, tmp_path: Path) -> No
 def test_a_continued_run_fills_its_buffer_before_it_learns(env: VecEnv, tmp_path: Path) -> None:
     model = learner(env, "qrdqn")
     model.learn(80, log_interval=None)
-    prepare_run(configured("qrdqn"), tmp_path)
+    TRAINING.begin(tmp_path, configured("qrdqn"))
     save(model, tmp_path)
     loaded = load_last_checkpoint(tmp_path)
     loaded.set_env(env)
@@ -205,7 +205,7 @@ def test_the_evaluation_of_maskable_learners_plays_it(env: VecEnv, name: str) ->
 
 @NAMES
 def test_the_agent_plays_it(env: VecEnv, name: str, tmp_path: Path) -> None:
-    prepare_run(configured(name), tmp_path)
+    TRAINING.begin(tmp_path, configured(name))
     save(learner(env, name), tmp_path)
     agent = RLAgent(tmp_path)
     task = load_suite("mini").tasks[0]

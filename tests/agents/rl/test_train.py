@@ -20,8 +20,9 @@ from agents.configs import dump
 from agents.rl.callbacks import TrackerWriter, read_curve
 from agents.rl.config import TrainConfig
 from agents.rl.policy_file import MODEL, read_about
-from agents.rl.train import RunConflict, load_last_checkpoint, train
+from agents.rl.train import load_last_checkpoint, train
 from er_gym.locking import Locked, exclusive_use
+from er_gym.resumable import FolderConflict
 
 Make = Callable[..., TrainConfig]
 ROOT = Path(__file__).resolve().parents[3]
@@ -117,7 +118,9 @@ def test_more_steps_continue_a_run_and_a_complete_run_does_nothing(
 
 def test_another_kind_of_folder_is_left_alone(make_config: Make, tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text("{}")
-    with pytest.raises(RunConflict, match=r"is a run \(it holds run\.json\); choose another --out"):
+    with pytest.raises(
+        FolderConflict, match=r"is a run \(it holds run\.json\); choose another --out"
+    ):
         train(make_config(), tmp_path)
     assert [each.name for each in tmp_path.iterdir()] == ["run.json"]
 
@@ -125,7 +128,7 @@ def test_another_kind_of_folder_is_left_alone(make_config: Make, tmp_path: Path)
 def test_another_configuration_is_refused(make_config: Make, tmp_path: Path) -> None:
     run = tmp_path / "run"
     train(make_config(), run)
-    with pytest.raises(RunConflict, match=r"\(seed was 0, now 1\); give another --out"):
+    with pytest.raises(FolderConflict, match=r"its seed is 0, this one's 1; choose another --out"):
         train(make_config(seed=1), run)
 
 

@@ -588,10 +588,10 @@ def test_the_run_of_an_adapter_is_merged_once_and_whole(
     assert "tags" in (merge(run / "model") / "agent.yaml").read_text()
     (run / "merged" / "notes.txt").write_text("mine")
     (run / "model" / "agent.yaml").write_text("prompts: {dialect: paper}\n")
-    with pytest.raises(ValueError, match=r"holds notes\.txt, which would be lost"):
+    with pytest.raises(ValueError, match=r"merged is not empty; .*would be lost: notes\.txt"):
         merge(run / "model")
     (run / "merged" / "merged_from.json").rename(run / "merged" / "stamp.json")
-    with pytest.raises(ValueError, match=r"merged holds .*, which would be lost"):
+    with pytest.raises(ValueError, match=r"merged is not empty; .*would be lost: "):
         merge(run / "model")
     assert (run / "merged" / "notes.txt").read_text() == "mine"
     shutil.rmtree(run / "merged")

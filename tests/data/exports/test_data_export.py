@@ -55,7 +55,7 @@ def test_no_collection_is_said(tmp_path: Path) -> None:
     given = [str(tmp_path), "--to", "trl", "--out", str(tmp_path / "out")]
     result = CliRunner().invoke(command, given)
     assert result.exit_code == 2
-    assert "is not a collection of trajectories" in result.output
+    assert "is no collection: " in result.output
 
 
 def test_help_names_what_there_is() -> None:
