@@ -30,12 +30,13 @@ from agents.vlm.settings import AgentSettings
 from agents.vlm.tuned_model import agent_file
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import Place
-from benchmarks.scoring.tables import Table, as_markdown, print_tables
+from benchmarks.scoring.tables import print_tables
 from benchmarks.terminal import stdout
 from er_gym.data.dialects import load_dialect
 from er_gym.data.frame_chat import Question, questions, words_for_frames
 from er_gym.data.frames import Frame, FrameSet
 from er_gym.data.scene_text import FrameWords, SceneWords
+from er_gym.tables import Table, as_markdown
 from er_gym.tasks.reading import read_bytes
 from er_gym.thor.objects import TYPES
 from er_gym.writing import inside

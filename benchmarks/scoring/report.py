@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-import io
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from er_gym.rollout.causes import CauseCount, causes_in, count_causes
 from er_gym.rollout.judgement import lacks_search_targets
 from er_gym.rollout.records import EpisodeRecord, episode_key
 from er_gym.rollout.run_directory import Manifest, RunDirectory
+from er_gym.tables import Table
 from er_gym.tasks.errors import describe_substitutions
 from er_gym.tasks.types import BY_NAME, GROUPS
 
@@ -256,26 +256,24 @@ def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = Fal
     stands for one that a scene lacks, has a line without figures; so does a file that is not an
     episode, and a cause that records name.
     """
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
     columns = [f"{metric}{end}" for metric in METRICS for end in ("", "_low", "_high")]
-    writer.writerow(["run", "agent", "suite", "protocol", "scorer", "level", "name", "n", *columns])
+    rows: list[tuple[object, ...]] = []
     for run in runs:
         manifest = run.manifest
-        head = [str(run.path), manifest.agent, manifest.suite, manifest.protocol]
+        head = (run.path, manifest.agent, manifest.suite, manifest.protocol)
         for name, scores in run.shown(scorer).items():
             for level, part, summary in slices(scores):
                 if level == "type" and not with_types:
                     continue
-                estimates = [dataclasses.astuple(summary[metric]) for metric in METRICS]
-                numbers = [number for estimate in estimates for number in estimate]
-                writer.writerow([*head, name, level, part, summary.n, *numbers])
+                estimates = (dataclasses.astuple(summary[metric]) for metric in METRICS)
+                rows.append((*head, name, level, part, summary.n, *chain(*estimates)))
         for level, lines in (
             ("set aside", map(str, run.manifest.set_aside)),
             ("taken", describe_substitutions(run.manifest.taken)),
             ("not counted", run.unusable),
             ("cause", run.causes_in_words),
         ):
-            for line in lines:
-                writer.writerow([*head, "", level, line, 0, *[""] * len(columns)])
-    return out.getvalue()
+            rows += ((*head, "", level, line, 0, *[""] * len(columns)) for line in lines)
+    told = ("run", "agent", "suite", "protocol", "scorer", "level", "name", "n", *columns)
+    cells = (tuple("" if cell is None else str(cell) for cell in row) for row in rows)
+    return Table("", told, tuple(cells), 7).csv()

@@ -14,9 +14,10 @@ from benchmarks.scoring import task_counts
 from benchmarks.scoring.data_tables import statistics_tables
 from benchmarks.scoring.metrics import Estimate
 from benchmarks.scoring.report import load_run
-from benchmarks.scoring.tables import Table, interval, print_tables, signed, tables
+from benchmarks.scoring.tables import interval, print_tables, signed, tables
 from er_gym.data.paper_figures import SETS, THOUGHTS
 from er_gym.data.statistics import PartStatistics, Statistics
+from er_gym.tables import Table
 
 TABLE = Table(
     "Results, in %",

@@ -61,18 +61,13 @@ class TrainingPages:
         return self._site.show(request, "trained.html", told)
 
     def _show_plan(self, request: Request, place: Place) -> Response:
-        from benchmarks.monitor.plan_view import ladder_chart, ladder_rows, studies
+        from benchmarks.monitor.plan_view import part_views
 
         t = self._site.translator(request)
         inside = _Inside(self._site, place)
         plan, settings = self._plan(place)
-        told: dict[str, Any] = {"rows": [], "chart": "", "studies": []}
-        if settings is not None and place.kind == "ladder":
-            rows = ladder_rows(settings, inside)
-            told |= {"rows": rows, "chart": ladder_chart(rows, t)}
-        elif settings is not None:
-            told["studies"] = studies(settings, inside, t)
-        told |= {
+        told = {
+            "compared": part_views(place.kind, settings, inside, t) if settings else [],
             "plan": plan,
             "groups": GROUPS,
             "live": ",".join([place.id, *(each.id for each in inside.places.values())][:100]),

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from benchmarks.plan import checks
-from benchmarks.plan.phase import Phase
-from benchmarks.plan.settings import Collected, PlaySettings, Taught
+from benchmarks.study import checks
+from benchmarks.study.phase import Phase
+from benchmarks.study.settings import Collected, PlaySettings, Taught
 
 
 @dataclass(frozen=True)
