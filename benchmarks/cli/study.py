@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import reduce
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,9 +14,8 @@ from benchmarks.cli.options import Place, overrides_option
 from benchmarks.terminal import echo, stdout, terminal
 
 if TYPE_CHECKING:
-    from benchmarks.study.kinds import Kind
+    from benchmarks.study.kinds import Study
     from benchmarks.study.phase import Phase
-    from benchmarks.study.results import Part, Result
     from benchmarks.study.run import Plan
 
 
@@ -32,7 +29,23 @@ def _study(name: str, what: str, about: str) -> click.Command:
     """
 
     @click.command(name, help=about)
-    @_options(what)
+    @click.option(
+        "--config",
+        required=True,
+        metavar="NAME",
+        help=f"The {what}: a YAML file, or the name of one of er-gym's own.",
+    )
+    @overrides_option("evaluation.limit=100")
+    @click.option(
+        "--out",
+        type=Place(file_okay=False, path_type=Path),
+        help=f"The {what}'s directory.  [default: runs/{what}/CONFIG]",
+    )
+    @click.option("--until", metavar="PHASE", help="Stop after this phase.")
+    @click.option(
+        "--print", "only_print", is_flag=True, help="Print the phases and run none of them."
+    )
+    @with_executor_options(workers=False)
     def run(
         config: str,
         overrides: tuple[str, ...],
@@ -41,51 +54,20 @@ def _study(name: str, what: str, about: str) -> click.Command:
         only_print: bool,
         executor_options: ExecutorOptions,
     ) -> int:
-        from benchmarks.study.kinds import KINDS, read_parts
+        from benchmarks.study.kinds import KINDS, Study
 
-        kind = KINDS[what]
         with bad_input():
-            settings = kind.load(config, overrides)
-        out = out or Path("runs") / what / Path(config).stem
-        plan = _executed_by(kind.plan(settings, out), executor_options)
+            settings = KINDS[what].load(config, overrides)
+        study = Study(KINDS[what], out or Path("runs") / what / Path(config).stem, settings)
+        plan = _executed_by(study.plan, executor_options)
         if only_print:
             return _print(plan)
-        code = _carry_out(plan, out, until)
+        code = _carry_out(plan, study.path, until)
         if not code:
-            with bad_input():
-                found = read_parts(kind, settings, out)
-            _show(kind, out, found)
+            _show(study)
         return code
 
     return run
-
-
-def _options(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The options of a command that runs a kind of study."""
-    options = (
-        click.option(
-            "--config",
-            required=True,
-            metavar="NAME",
-            help=f"The {what}: a YAML file, or the name of one of er-gym's own.",
-        ),
-        overrides_option("evaluation.limit=100"),
-        click.option(
-            "--out",
-            type=Place(file_okay=False, path_type=Path),
-            help=f"The {what}'s directory.  [default: runs/{what}/CONFIG]",
-        ),
-        click.option("--until", metavar="PHASE", help="Stop after this phase."),
-        click.option(
-            "--print", "only_print", is_flag=True, help="Print the phases and run none of them."
-        ),
-    )
-
-    def add(command: Callable[..., Any]) -> Callable[..., Any]:
-        command = with_executor_options(workers=False)(command)
-        return reduce(lambda made, option: option(made), reversed(options), command)
-
-    return add
 
 
 _PLAYS = ("bench", "collect")
@@ -154,24 +136,22 @@ def _carry_out(plan: Plan, out: Path, until: str | None) -> int:
     return 0
 
 
-def _show(kind: Kind, out: Path, found: list[tuple[Part, list[Result]]]) -> None:
+def _show(study: Study) -> None:
     """Print the tables, and write them, the figures and the pictures."""
     from benchmarks.scoring.tables import print_tables
-    from benchmarks.study.kinds import write_results
 
+    with bad_input():
+        found = study.results()
     if not found:
-        echo(f"no model has been measured yet: {out}")
+        echo(f"no model has been measured yet: {study.path}")
         return
-    for part, results in found:
-        print_tables(part.tables(results), stdout())
-    files = write_results(kind, out, found)
+    print_tables([table for part, results in found for table in part.tables(results)], stdout())
+    files = study.write(found)
     try:
-        from benchmarks.scoring.drawing import draw, write_chart
+        from benchmarks.scoring.drawing import draw, write_charts
 
-        for part, results in found:
-            if part.pictured:
-                write_chart(out / f"{part.name}.png", draw(part.picture(results)), force=True)
-                files.append(out / f"{part.name}.png")
+        drawn = {part.name: draw(part.picture(results)) for part, results in found if part.pictured}
+        files += write_charts(study.path, drawn, force=True)
     except ImportError as error:
         print_problem(str(error))
     echo(", ".join(map(str, files)))

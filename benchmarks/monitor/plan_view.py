@@ -19,7 +19,7 @@ from benchmarks.monitor.places import Place
 from benchmarks.monitor.run_view import RunSummary, Tally
 from benchmarks.scoring.metrics import Estimate
 from benchmarks.study.charts import Shown
-from benchmarks.study.kinds import KINDS
+from benchmarks.study.kinds import KINDS, Study
 from benchmarks.study.phase import Measurement
 from benchmarks.study.run import PlanRecord
 from er_gym.tasks.errors import TaskFileError
@@ -126,7 +126,8 @@ def plan_view(place: Place, inside: Inside) -> tuple[PlanView, Any]:
         record = PlanRecord.model_validate_json(read_text(file))
         settings = kind.settings.model_validate(record.settings)
         phases = [
-            (each.name, str(each), each.out) for each in kind.plan(settings, place.path).phases
+            (each.name, str(each), each.out)
+            for each in Study(kind, place.path, settings).plan.phases
         ]
     except ValidationError as error:
         first = error.errors()[0]
@@ -168,9 +169,11 @@ def part_views(kind: str, settings: Any, inside: Inside, t: Translator) -> list[
     found: list[PartView] = []
     for part in KINDS[kind].parts(settings):
         rows = [_measured(each, inside) for each in part.measured]
-        title = t("success_by_stage") if kind == "ladder" else part.title or part.name
-        chart = replace(part.chart([row.shown for row in rows], t), title=title)
-        found.append(PartView(title, rows, as_svg(f"part-{len(found)}", chart)))
+        chart = part.chart([row.shown for row in rows], t)
+        if kind == "ladder":
+            chart = replace(chart, title=t("success_by_stage"))
+        picture = as_svg(f"part-{len(found)}", chart)
+        found.append(PartView(chart.title or part.name, rows, picture))
     return found
 
 

@@ -20,13 +20,14 @@ from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import force_option
 from benchmarks.pages.baselines import machine
 from benchmarks.pages.failure_maps import draw_examples, examples, failure_shares, in_words
-from benchmarks.scoring.drawing import draw, write_chart
+from benchmarks.scoring.drawing import draw, write_charts
 from benchmarks.scoring.report import RunReport, load_run
 from benchmarks.scoring.series import Axis, Chart, Series, points
 from benchmarks.scoring.splits import split_results, split_table
 from benchmarks.study.kinds import ABLATION, LADDER, Study
 from benchmarks.study.ladder_settings import CONTROLS
 from benchmarks.study.results import Result
+from benchmarks.study.run import PlanRecord
 from er_gym.tables import Table, as_markdown
 from er_gym.writing import MARKDOWN_MARK, check_output, write_output
 
@@ -61,10 +62,10 @@ def main(
     with bad_input():
         check_output(out, force=force)
         climbed = [Study.open(LADDER, path) for path in ladders]
-        parts = [_ladder_section(each, out.parent / "images", force) for each in climbed]
-        parts += _generalisation(climbed, others)
+        parts = [_ladder_section(*each, out.parent / "images", force) for each in climbed]
+        parts += _generalisation([ladder for ladder, _ in climbed], others)
         ablated = [Study.open(ABLATION, path) for path in ablations]
-        parts += [_ablation_section(each, out.parent / "images", force) for each in ablated]
+        parts += [_ablation_section(*each, out.parent / "images", force) for each in ablated]
         page = MARKDOWN_MARK + _INTRODUCTION.format(machine=machine()) + "\n".join(parts)
         write_output(out, page, force=force)
     click.echo(out)
@@ -91,21 +92,20 @@ def _heading(study: Study, title: str, command: str) -> list[str]:
     ]
 
 
-def _ladder_section(ladder: Study, images: Path, force: bool) -> str:
+def _ladder_section(ladder: Study, record: PlanRecord, images: Path, force: bool) -> str:
     """What a ladder has come to."""
     name = ladder.path.name
     ((part, results),) = ladder.results()
     success = replace(part.picture(results), title=f"{name}: success after each stage")
     pictures = {
-        f"{name}-ladder.png": draw(success),
-        f"{name}-loss.png": draw(_losses(ladder), height=3.6),
+        f"{name}-ladder": draw(success),
+        f"{name}-loss": draw(_losses(ladder), height=3.6),
     }
     last = _run_of([r for r in results if not r.of.faults and r.name not in CONTROLS][-1])
     chosen = examples(last.episodes)
     if chosen:
-        pictures[f"{name}-failures.png"] = draw_examples(last.manifest, chosen)
-    for file, figure in pictures.items():
-        write_chart(images / file, figure, force=force, dpi=100)
+        pictures[f"{name}-failures"] = draw_examples(last.manifest, chosen)
+    write_charts(images, pictures, force=force)
     lines = [
         *_heading(ladder, name, "ladder"),
         as_markdown(part.tables(results)),
@@ -113,7 +113,7 @@ def _ladder_section(ladder: Study, images: Path, force: bool) -> str:
         "",
         f"![Loss of each fine-tuning](images/{name}-loss.png)",
         "",
-        as_markdown([_failure_table(results), _cost_table(ladder)]),
+        as_markdown([_failure_table(results), _cost_table(record)]),
     ]
     if chosen:
         lines += [
@@ -151,9 +151,9 @@ def _failure_table(results: Sequence[Result]) -> Table:
     )
 
 
-def _cost_table(ladder: Study) -> Table:
+def _cost_table(record: PlanRecord) -> Table:
     """How long each phase took."""
-    phases = ladder.record.done
+    phases = record.done
     total = sum(each.seconds for each in phases)
     rows = [(each.name, f"er-gym {each.command[0]}", _minutes(each.seconds)) for each in phases]
     return Table(
@@ -172,7 +172,7 @@ def _losses(ladder: Study) -> Chart:
     """The loss of each fine-tuning over the updates of all."""
     series = []
     before = 0
-    for phase in ladder.kind.plan(ladder.settings, ladder.path).phases:
+    for phase in ladder.plan.phases:
         file = ladder.path / phase.out / METRICS
         if phase.command[0] != "finetune" or not file.exists():
             continue
@@ -206,17 +206,18 @@ def _generalisation(ladders: Iterable[Study], others: Iterable[tuple[str, Path]]
     return [f"## How far it carries\n\n{as_markdown([split_table(split_results(reports))])}"]
 
 
-def _ablation_section(ablation: Study, images: Path, force: bool) -> str:
+def _ablation_section(ablation: Study, record: PlanRecord, images: Path, force: bool) -> str:
     """The tables and pictures of an ablation."""
     name = ablation.path.name
     lines = _heading(ablation, f"Ablations: {name}", "ablate")
     for part, results in ablation.results():
         lines.append(as_markdown(part.tables(results)))
         if part.pictured:
-            file = f"ablation-{name}-{part.name}.png"
-            write_chart(images / file, draw(part.picture(results)), force=force, dpi=100)
-            lines += [f"![{part.title}](images/{file})", ""]
-    minutes = _minutes(sum(each.seconds for each in ablation.record.done))
+            chart = part.picture(results)
+            picture = {f"ablation-{name}-{part.name}": draw(chart)}
+            (file,) = write_charts(images, picture, force=force)
+            lines += [f"![{chart.title}](images/{file.name})", ""]
+    minutes = _minutes(sum(each.seconds for each in record.done))
     lines += [f"All of it took {minutes} minutes.", ""]
     return "\n".join(lines)
 

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from benchmarks.scoring.drawing import draw_panels, write_charts
+from benchmarks.scoring.drawing import draw, write_charts
 from benchmarks.scoring.series import Axis, Chart, Point, Series
 
 _POINTS = 200
@@ -51,7 +51,7 @@ def draw_curves(
             )
             for key, title in _PANELS.items()
         ]
-        figures[f"learning_{over}"] = draw_panels(panels, 11, 4.2)
+        figures[f"learning_{over}"] = draw(*panels, width=11, height=4.2)
     return write_charts(out, figures, force=force)
 
 

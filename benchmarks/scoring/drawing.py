@@ -64,12 +64,7 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def write_chart(path: Path, figure: Figure, *, force: bool, **options: Any) -> None:
-    """Write a chart as :func:`~er_gym.writing.write_figure` does, in :func:`own_style`."""
-    with own_style():
-        write_figure(path, figure, force=force, **options)
-
-
+@own_style()
 def write_charts(out: Path, figures: Mapping[str, Figure], *, force: bool) -> list[Path]:
     """Write charts into a folder, all of them or none.
 
@@ -90,7 +85,7 @@ def write_charts(out: Path, figures: Mapping[str, Figure], *, force: bool) -> li
         check_output(path, force=force)
     for path, figure in files.items():
         # "tight" grows the page to whatever sticks out of it: no label is cut.
-        write_chart(path, figure, force=force, dpi=100, bbox_inches="tight", pad_inches=0.15)
+        write_figure(path, figure, force=force, dpi=100, bbox_inches="tight", pad_inches=0.15)
     return list(files)
 
 
@@ -114,35 +109,26 @@ def _bare(axes: Axes, colour: str) -> None:
 
 
 @own_style()
-def draw(chart: Chart, width: float = 8.5, height: float = 4.6) -> Figure:
-    """Draw series over axes; inches.
+def draw(*charts: Chart, width: float = 8.5, height: float = 4.6) -> Figure:
+    """Draw a chart, or several of the same series side by side, with one y axis; inches.
 
     Raises:
         ImportError: matplotlib is not installed.
     """
-    figure, axes = canvas(width, height, chart.title)
-    _draw_series(axes, chart)
-    if len(chart.series) > 1:
-        axes.legend(frameon=False, labelcolor=INK, loc="best")
-    return figure
-
-
-@own_style()
-def draw_panels(charts: Sequence[Chart], width: float, height: float) -> Figure:
-    """Draw charts of the same series side by side, with one y axis and one legend; inches.
-
-    Raises:
-        ImportError: matplotlib is not installed.
-    """
-    figure = new_figure(width, height)
-    panels = figure.subplots(1, len(charts), sharey=True)
+    if len(charts) == 1:
+        figure, only = canvas(width, height, charts[0].title)
+        panels = [only]
+    else:
+        figure = new_figure(width, height)
+        panels = list(figure.subplots(1, len(charts), sharey=True))
     for axes, chart in zip(panels, charts, strict=True):
-        axes.set_title(chart.title, loc="left", fontsize=11, color=INK)
-        _bare(axes, MUTED)
+        if len(charts) > 1:
+            _bare(axes, MUTED)
+            axes.set_title(chart.title, loc="left", fontsize=11, color=INK)
         _draw_series(axes, chart)
-    panels[-1].legend(frameon=False, labelcolor=INK, loc="lower right")
-    for axes in panels[1:]:
-        axes.set_ylabel("")
+        axes.label_outer()
+    if len(charts[0].series) > 1:
+        panels[-1].legend(frameon=False, labelcolor=INK)
     return figure
 
 

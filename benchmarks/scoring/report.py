@@ -160,15 +160,20 @@ def _miss(episode: EpisodeRecord, scored: Score) -> Miss:
     )
 
 
+def _parts(scores: Sequence[Score]) -> list[tuple[str, str, Sequence[Score]]]:
+    """(level, name, scores) overall, for each group and for each task type that was played, in the
+    order of the paper's table and of the table of task types."""
+    groups, types = by(scores, lambda each: each.group), by(scores, lambda each: each.task_type)
+    return [
+        *([("overall", "all", scores)] if scores else []),
+        *(("group", name, groups[name]) for name in GROUPS if name in groups),
+        *(("type", name, types[name]) for name in BY_NAME if name in types),
+    ]
+
+
 def slices(scores: Sequence[Score]) -> list[tuple[str, str, Summary]]:
     """(level, name, summary) overall, for each group and for each task type that was played."""
-    if not scores:
-        return []
-    return [
-        ("overall", "all", summarise(scores)),
-        *(("group", *each) for each in by_group(scores).items()),
-        *(("type", *each) for each in by_type(scores).items()),
-    ]
+    return [(level, name, summarise(part)) for level, name, part in _parts(scores)]
 
 
 def sample_slices(scores: Sequence[Score]) -> list[tuple[str, str, TaskSamples]]:
@@ -176,24 +181,13 @@ def sample_slices(scores: Sequence[Score]) -> list[tuple[str, str, TaskSamples]]
     samples = most_samples(scores)
     if samples < 2:
         return []
-    groups, types = by(scores, lambda each: each.group), by(scores, lambda each: each.task_type)
-    parts = [
-        ("overall", "all", scores),
-        *(("group", name, groups[name]) for name in GROUPS if name in groups),
-        *(("type", name, types[name]) for name in BY_NAME if name in types),
-    ]
-    found = [(level, name, task_samples(part, samples)) for level, name, part in parts]
+    found = [(level, name, task_samples(part, samples)) for level, name, part in _parts(scores)]
     return [(level, name, counted) for level, name, counted in found if counted is not None]
 
 
 def by_group(scores: Sequence[Score]) -> dict[str, Summary]:
     """Summaries of the groups that were played, in the order of the paper's table."""
     return summarise_by(scores, lambda each: each.group, GROUPS)
-
-
-def by_type(scores: Sequence[Score]) -> dict[str, Summary]:
-    """Summaries of the task types that were played, in the order of the table of task types."""
-    return summarise_by(scores, lambda each: each.task_type, BY_NAME)
 
 
 def as_json(runs: Sequence[RunReport]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from textwrap import fill
 
@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from benchmarks.scoring.metrics import METRICS, Estimate, Score, Summary
-from benchmarks.scoring.report import BOTH, RunReport, by_group, by_type, sample_slices, slices
+from benchmarks.scoring.metrics import METRICS, Estimate, Score
+from benchmarks.scoring.report import BOTH, RunReport, by_group, sample_slices, slices
 from benchmarks.scoring.samples import most_samples
 from benchmarks.terminal import plain
 from er_gym.envs.protocol import DEFAULT
@@ -147,7 +147,7 @@ def _metrics(run: RunReport, scorer: str, scores: Sequence[Score]) -> Table:
 def _samples(run: RunReport, scorer: str, scores: Sequence[Score], with_types: bool) -> Table:
     """Success by task, where tasks were played several times."""
     lines = [
-        (BY_NAME[name].title if level == "type" else "All" if level == "overall" else name, counted)
+        (_name_of(level, name), counted)
         for level, name, counted in sample_slices(scores)
         if with_types or level != "type"
     ]
@@ -170,6 +170,11 @@ def _samples(run: RunReport, scorer: str, scores: Sequence[Score], with_types: b
         notes=(f"{rest} of {number} tasks have fewer samples and are not counted here",)
         * (rest > 0),
     )
+
+
+def _name_of(level: str, name: str) -> str:
+    """What tables call a slice."""
+    return "All" if level == "overall" else BY_NAME[name].title if level == "type" else name
 
 
 def _notes(run: RunReport) -> list[str]:
@@ -195,11 +200,7 @@ def _notes(run: RunReport) -> list[str]:
 
 
 def _types(run: RunReport, scorer: str, scores: Sequence[Score]) -> Table:
-    lines: Iterable[tuple[str, Summary]] = (
-        ("All", slices(scores)[0][2]),
-        *by_group(scores).items(),
-        *((BY_NAME[name].title, summary) for name, summary in by_type(scores).items()),
-    )
+    lines = [(_name_of(level, name), summary) for level, name, summary in slices(scores)]
     rows = [
         (
             name,

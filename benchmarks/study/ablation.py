@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 from benchmarks.scoring.paired import paired_difference
 from benchmarks.study.ablation_phases import row_measured
@@ -20,7 +19,6 @@ def ablation_parts(settings: AblationSettings) -> list[Part]:
     return [
         Part(
             name=name,
-            title=study.title,
             measured=[row_measured(settings, row) for row in study.rows],
             compared=compared,
             tables=partial(_tables, study),
@@ -54,13 +52,3 @@ def _tables(study: Compared, results: Sequence[Result]) -> list[Table]:
         may_turn=True,
     )
     return [table]
-
-
-def ablation_told(parts: Mapping[str, Sequence[Result]]) -> dict[str, Any]:
-    """All figures of an ablation."""
-    return {
-        "studies": {
-            name: [{"by_seed": each.by_seed, **each.told()} for each in results]
-            for name, results in parts.items()
-        }
-    }

@@ -64,7 +64,8 @@ class _Ablation:
             )
             model = out
         out, evaluation = _evaluation(name, seed), settings.evaluation
-        yield make.bench_model(out, out, make.at(model), evaluation.suite, evaluation.limit)
+        player = f"hf:{make.at(model)}"
+        yield make.bench(out, out, player, evaluation.suite, evaluation.limit, ())
 
 
 def _collection(name: str) -> str:

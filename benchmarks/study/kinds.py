@@ -5,15 +5,16 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from agents import configs
-from benchmarks.study.ablation import ablation_parts, ablation_told
+from benchmarks.study.ablation import ablation_parts
 from benchmarks.study.ablation_phases import ablation_phases
 from benchmarks.study.ablation_settings import AblationSettings
 from benchmarks.study.commands import Commands
-from benchmarks.study.ladder import ladder_parts, ladder_told
+from benchmarks.study.ladder import ladder_parts
 from benchmarks.study.ladder_phases import ladder_phases
 from benchmarks.study.ladder_settings import LadderSettings
 from benchmarks.study.phase import Phase
@@ -34,7 +35,6 @@ class Kind:
         settings: the model of these files.
         phases: of settings, in order.
         parts: the models of settings that are compared.
-        told: the figures of each part's results, by its name, as ``result.json`` has them.
     """
 
     name: str
@@ -42,7 +42,6 @@ class Kind:
     settings: type[PlaySettings]
     phases: Callable[[Any, Commands], Iterable[Phase]]
     parts: Callable[[Any], list[Part]]
-    told: Callable[[Mapping[str, Sequence[Result]]], dict[str, Any]]
 
     def names(self) -> tuple[str, ...]:
         """The names of er-gym's own, in alphabetical order."""
@@ -57,15 +56,9 @@ class Kind:
         file = configs.file_of(self.folder, name, self.name)
         return configs.load(self.settings, file, self.name, overrides)
 
-    def plan(self, settings: PlaySettings, root: Path) -> Plan:
-        """All phases of settings in order; ``root`` is the study's directory."""
-        return Plan(self.name, settings, tuple(self.phases(settings, Commands(settings, root))))
 
-
-LADDER = Kind("ladder", "ladder", LadderSettings, ladder_phases, ladder_parts, ladder_told)
-ABLATION = Kind(
-    "ablation", "ablations", AblationSettings, ablation_phases, ablation_parts, ablation_told
-)
+LADDER = Kind("ladder", "ladder", LadderSettings, ladder_phases, ladder_parts)
+ABLATION = Kind("ablation", "ablations", AblationSettings, ablation_phases, ablation_parts)
 KINDS: Mapping[str, Kind] = {each.name: each for each in (LADDER, ABLATION)}
 
 
@@ -74,50 +67,46 @@ class Study:
     """A study, as far as it has come.
 
     Attributes:
-        kind: its kind.
-        path: its directory.
-        settings: what it was made from.
-        record: what has been done.
+        kind, path, settings: its kind, its directory, and what it is made from.
     """
 
     kind: Kind
     path: Path
     settings: PlaySettings
-    record: PlanRecord
 
     @staticmethod
-    def open(kind: Kind, path: Path) -> Study:
-        """Read it.
+    def open(kind: Kind, path: Path) -> tuple[Study, PlanRecord]:
+        """Read what there is, and what has been done.
 
         Raises:
             ValueError: it is no directory of this kind.
             OSError: it cannot be read.
         """
         record = PlanRecord.model_validate_json((path / f"{kind.name}.json").read_bytes())
-        return Study(kind, path, kind.settings.model_validate(record.settings), record)
+        return Study(kind, path, kind.settings.model_validate(record.settings)), record
+
+    @cached_property
+    def plan(self) -> Plan:
+        """All phases in order."""
+        phases = self.kind.phases(self.settings, Commands(self.settings, self.path))
+        return Plan(self.kind.name, self.settings, tuple(phases))
 
     def results(self) -> list[tuple[Part, list[Result]]]:
-        """See :func:`read_parts`."""
-        return read_parts(self.kind, self.settings, self.path)
+        """The parts of which a model has been measured, and the results so far.
 
+        Raises:
+            RunDirectoryError: a run directory is damaged.
+        """
+        found = [(part, part.read(self.path)) for part in self.kind.parts(self.settings)]
+        return [(part, results) for part, results in found if results]
 
-def read_parts(kind: Kind, settings: PlaySettings, root: Path) -> list[tuple[Part, list[Result]]]:
-    """The parts of which a model has been measured, and the results so far.
-
-    Raises:
-        RunDirectoryError: a run directory is damaged.
-    """
-    found = [(part, part.read(root)) for part in kind.parts(settings)]
-    return [(part, results) for part, results in found if results]
-
-
-def write_results(kind: Kind, root: Path, found: Sequence[tuple[Part, list[Result]]]) -> list[Path]:
-    """Write the tables and the figures into a study's directory: the files."""
-    told = {
-        "format": f"er-gym/{kind.name}-result/1",
-        **kind.told({part.name: results for part, results in found}),
-    }
-    tables = [table for part, results in found for table in part.tables(results)]
-    write_atomic(root / "result.md", as_markdown(tables))
-    write_atomic(root / "result.json", json.dumps(told, indent=1) + "\n")
-    return [root / "result.md", root / "result.json"]
+    def write(self, found: Sequence[tuple[Part, list[Result]]]) -> list[Path]:
+        """Write the tables and the figures of results into the directory: the files."""
+        told: dict[str, Any] = {"format": f"er-gym/{self.kind.name}-result/1"}
+        rows = {part.name: [each.told() for each in results] for part, results in found}
+        told |= {"studies": rows} if self.kind is ABLATION else {"rungs": rows["ladder"]}
+        tables = [table for part, results in found for table in part.tables(results)]
+        files = [self.path / "result.md", self.path / "result.json"]
+        write_atomic(files[0], as_markdown(tables))
+        write_atomic(files[1], json.dumps(told, indent=1) + "\n")
+        return files

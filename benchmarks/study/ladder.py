@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 from agents.finetune.settings import STAGES
 from benchmarks.scoring.metrics import Estimate
@@ -15,7 +14,7 @@ from benchmarks.study.charts import ladder_chart
 from benchmarks.study.ladder_phases import rungs
 from benchmarks.study.ladder_settings import CONTROLS, LadderSettings
 from benchmarks.study.paper_rungs import PAPER
-from benchmarks.study.results import Part, Result, figures, results_table
+from benchmarks.study.results import Part, Result, results_table
 from er_gym.tables import Table
 
 
@@ -25,7 +24,6 @@ def ladder_parts(settings: LadderSettings) -> list[Part]:
     return [
         Part(
             name="ladder",
-            title=title,
             measured=rungs(settings),
             compared=compared,
             tables=ladder_tables,
@@ -83,10 +81,9 @@ def _difference(first: Result | None, second: Result, metric: str = "success") -
 def ladder_tables(results: Sequence[Result]) -> list[Table]:
     """The results as tables: the rungs beside the paper's, and success by key actions."""
     names = [each.name for each in results if not each.of.faults]
-    figures = "success interval gain search_efficiency completeness groups repeat_rate tokens"
     every = results_table(
         "The ladder, in %",
-        f"rung n {figures}",
+        "rung n success interval gain search_efficiency completeness groups repeat_rate tokens",
         results,
         "gain: in success over the rung above it, paired over tasks; of random and blind, "
         "over the last rung",
@@ -124,20 +121,3 @@ def _paper_row(name: str) -> tuple[str, ...]:
         *(f"{each:.1f}" for each in told),
         *[NONE] * 2,
     )
-
-
-def ladder_told(parts: Mapping[str, Sequence[Result]]) -> dict[str, Any]:
-    """All figures of a ladder."""
-    return {
-        "rungs": [
-            {
-                "faults": each.of.faults,
-                "run": next(iter(each.of.runs.values())),
-                "tokens": each.tokens,
-                **each.told(),
-                "by_key_actions": {str(n): figures(row) for n, row in each.by_key_actions.items()},
-            }
-            for results in parts.values()
-            for each in results
-        ]
-    }

@@ -118,14 +118,13 @@ class _Ladder:
             yield from make.teach(names, run, out, row.teacher)
         if row.sample is not None:
             sample, run = row.sample, f"samples/{number}"
-            yield make.bench_model(
+            yield make.bench(
                 f"{number}/sample",
                 run,
-                model,
+                f"hf:{model}",
                 self.settings.suite,
                 sample.tasks,
-                f"sampling.temperature={sample.temperature}",
-                f"sampling.top_p={sample.top_p}",
+                (f"sampling.temperature={sample.temperature}", f"sampling.top_p={sample.top_p}"),
                 faults=sample.faults,
                 samples=sample.samples,
                 skip=sample.skip,
@@ -178,8 +177,8 @@ class _Ladder:
             play = [f"prompts.dialect={self.settings.dialect}", *sees, *play]
         samples = evaluation.fault_samples if faults and evaluation.fault_samples > 1 else None
         suite, limit = evaluation.suite, evaluation.limit
-        return self.make.bench_model(
-            out, out, model, suite, limit, *play, faults=faults, samples=samples
+        return self.make.bench(
+            out, out, f"hf:{model}", suite, limit, play, faults=faults, samples=samples
         )
 
     def _control(self, name: Control, model: str) -> Phase:
@@ -187,7 +186,7 @@ class _Ladder:
         suite, limit = evaluation.suite, evaluation.limit
         if name == "blind":
             noise = (*evaluation.set, "pictures.noise=true")
-            return self.make.bench_model(out, out, model, suite, limit, *noise)
+            return self.make.bench(out, out, f"hf:{model}", suite, limit, noise)
         return self.make.bench(out, out, name, suite, limit)
 
 

@@ -104,9 +104,14 @@ class Result:
         """All figures, as fractions with their intervals."""
         return {
             "name": self.name,
-            **figures(self.summary),
+            "faults": self.of.faults,
+            **({"run": next(iter(self.of.runs.values()))} if len(self.of.runs) == 1 else {}),
+            **_figures(self.summary),
             **{name: each and asdict(each) for name, each in self.differences.items()},
-            "groups": {name: figures(each) for name, each in self.groups.items()},
+            "by_seed": self.by_seed,
+            "tokens": self.tokens,
+            "groups": {name: _figures(each) for name, each in self.groups.items()},
+            "by_key_actions": {str(n): _figures(each) for n, each in self.by_key_actions.items()},
         }
 
 
@@ -128,7 +133,6 @@ class Part:
 
     Attributes:
         name: of its picture, and of an ablation's study.
-        title: above its chart.
         measured: the models, in order.
         compared: gives results, in order, their differences.
         tables: what the results have come to.
@@ -137,7 +141,6 @@ class Part:
     """
 
     name: str
-    title: str
     measured: Sequence[Measurement]
     compared: Callable[[Sequence[Result]], list[Result]]
     tables: Callable[[Sequence[Result]], list[Table]]
@@ -158,7 +161,7 @@ class Part:
         return self.chart([each.shown for each in results], in_english)
 
 
-def figures(summary: Summary) -> dict[str, Any]:
+def _figures(summary: Summary) -> dict[str, Any]:
     """The number of episodes and every metric."""
     return {"n": summary.n, **{name: asdict(each) for name, each in summary.metrics.items()}}
 

@@ -15,7 +15,7 @@ from agents.finetune.drawing import drawn
 from agents.finetune.settings import load_settings
 from benchmarks.cli.main import cli
 from benchmarks.pages.models import main as models_page
-from benchmarks.study.kinds import ABLATION
+from benchmarks.study.kinds import ABLATION, Study
 
 for package in ("torch", "transformers", "peft", "tensorboard"):
     pytest.importorskip(package, reason="needs the extra finetune")
@@ -45,7 +45,7 @@ SMALL: dict[str, Any] = {
 @pytest.mark.parametrize("name", ABLATION.names())
 def test_the_phases_are_commands_that_exist(name: str, tmp_path: Path) -> None:
     settings = ABLATION.load(name)
-    plan = ABLATION.plan(settings, tmp_path).phases
+    plan = Study(ABLATION, tmp_path, settings).plan.phases
     assert len({phase.name for phase in plan}) == len(plan)
     for phase in plan:
         for option, value in pairwise(phase.command):

@@ -37,7 +37,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., dict
     def keep(path: Path, figure: Any, **_: Any) -> None:
         found[path.stem] = figure
 
-    monkeypatch.setattr(drawing, "write_chart", keep)
+    monkeypatch.setattr(drawing, "write_figure", keep)
 
     def run(draw: Callable[..., Any], *arguments: Any) -> dict[str, Any]:
         found.clear()

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from benchmarks.cli.main import cli
 from benchmarks.scoring.report import load_run
 from benchmarks.scoring.scorers import CORRECTED
-from benchmarks.study.kinds import LADDER, read_parts
+from benchmarks.study.kinds import LADDER, Study
 from benchmarks.study.ladder import ladder_tables
 from benchmarks.study.ladder_phases import rungs
 from benchmarks.study.ladder_settings import LadderSettings
@@ -50,7 +50,7 @@ def root(settings: LadderSettings, tmp_path_factory: pytest.TempPathFactory) -> 
 
 @pytest.fixture(scope="module")
 def results(settings: LadderSettings, root: Path) -> dict[tuple[str, float], Result]:
-    ((_, found),) = read_parts(LADDER, settings, root)
+    ((_, found),) = Study(LADDER, root, settings).results()
     return {(each.name, each.of.faults): each for each in found}
 
 
@@ -65,7 +65,7 @@ def by_task(root: Path, result: Result, metric: str) -> Mapping[str, float]:
 
 
 def test_only_faults_are_played_several_times(settings: LadderSettings, tmp_path: Path) -> None:
-    plan = {phase.name: phase.command for phase in LADDER.plan(settings, tmp_path).phases}
+    plan = {phase.name: phase.command for phase in Study(LADDER, tmp_path, settings).plan.phases}
     assert "--samples" not in plan["evaluations/3-reflection"]
     faulty = plan[f"evaluations/3-reflection-faults-{RATE}"]
     assert ("--samples", "3") in [*pairwise(faulty)]

@@ -16,7 +16,7 @@ from filelock import lock_descriptor
 
 from benchmarks.monitor.growth import growth, in_use
 from benchmarks.monitor.places import Places
-from benchmarks.study.kinds import ABLATION, LADDER
+from benchmarks.study.kinds import ABLATION, LADDER, Study
 from benchmarks.study.run import DonePhase, Plan, PlanRecord
 from er_gym import __version__
 from er_gym.locking import LOCK, exclusive_use
@@ -116,7 +116,7 @@ def test_a_ladder_shows_its_phases_and_the_success_of_each_rung(tmp_path, visit,
     root = tmp_path / "ladder"
     root.mkdir()
     settings = LADDER.load("tiny-text")
-    plan = LADDER.plan(settings, root)
+    plan = Study(LADDER, root, settings).plan
     names = [phase.name for phase in plan.phases]
     measured = names.index("evaluations/1-imitation")
     shutil.copytree(runs / "random", root / "evaluations" / "0-base")
@@ -146,7 +146,7 @@ def test_an_ablation_shows_its_studies(tmp_path, visit, runs):
     root = tmp_path / "ablation"
     root.mkdir()
     settings = ABLATION.load(ABLATION.names()[0])
-    make_plan(ABLATION.plan(settings, root), root, 1)
+    make_plan(Study(ABLATION, root, settings).plan, root, 1)
     study = next(iter(settings.studies.values()))
     for name, run in zip(study.rows, ("oracle", "random"), strict=False):
         shutil.copytree(runs / run, root / "evaluations" / name / str(settings.seeds[0]))
