@@ -14,6 +14,7 @@ _BASE = {
     "er_gym.extras",
     "er_gym.locking",
     "er_gym.plugins",
+    "er_gym.tables",
     "er_gym.writing",
 }
 _TASKS = {*_BASE, "er_gym.thor", "er_gym.tasks"}
@@ -29,6 +30,7 @@ _SCRIPTS = {*_HARNESS, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "be
 ALLOWED = {
     "er_gym.plugins": {"er_gym.plugins"},
     "er_gym.activity": set(),
+    "er_gym.tables": set(),
     "er_gym.writing": {"er_gym.writing"},
     "er_gym.extras": set(),
     "er_gym.locking": _BASE,

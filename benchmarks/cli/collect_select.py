@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from agents.expert.recipe import Recipe
     from agents.expert.selection import Screening, SelectionRules, TypeYield
     from agents.expert.writers.registry import NamedWriter
-    from benchmarks.scoring.tables import Table
     from er_gym.data.collection import Collection
     from er_gym.rollout.run_directory import RunDirectory
+    from er_gym.tables import Table
     from er_gym.tasks.suites import Suite
     from er_gym.tasks.task import Task
 
@@ -262,7 +262,7 @@ class Selection:
 
 def yield_table(yields: Mapping[str, TypeYield]) -> Table:
     """What became of the samples of each task type."""
-    from benchmarks.scoring.tables import Table
+    from er_gym.tables import Table
     from er_gym.tasks.types import BY_NAME
 
     reasons = sorted({reason for row in yields.values() for reason in row.left_out})

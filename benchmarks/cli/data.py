@@ -52,8 +52,9 @@ def stats(collection: Path, layout: str, plots: Path | None, force: bool) -> Non
     import json
 
     from benchmarks.scoring.data_tables import statistics_tables
-    from benchmarks.scoring.tables import as_markdown, print_tables
+    from benchmarks.scoring.tables import print_tables
     from er_gym.data.statistics import statistics
+    from er_gym.tables import as_markdown
 
     with bad_input(ImportError):
         found = statistics(_opened(collection))

@@ -15,7 +15,6 @@ from typing import NoReturn
 
 import click
 
-from benchmarks.cli.ablate import ablate
 from benchmarks.cli.activity import doing, new_modules, saying_what_it_does
 from benchmarks.cli.bench import bench
 from benchmarks.cli.collect import collect
@@ -30,13 +29,13 @@ from benchmarks.cli.errors import (
 )
 from benchmarks.cli.finetune import finetune
 from benchmarks.cli.inspect import inspect
-from benchmarks.cli.ladder import ladder
 from benchmarks.cli.new_model import new_model
 from benchmarks.cli.options import FOLDER, scorer_option
 from benchmarks.cli.player import player
 from benchmarks.cli.prompts import prompts
 from benchmarks.cli.render import play, render
 from benchmarks.cli.serve import match_server, serve
+from benchmarks.cli.study import ablate, ladder
 from benchmarks.cli.tasks import tasks
 from benchmarks.cli.train import train_rl
 from benchmarks.cli.ui import ui
@@ -139,7 +138,8 @@ def report(
     """
     from benchmarks.scoring import report as reports
     from benchmarks.scoring.splits import split_results, split_table
-    from benchmarks.scoring.tables import as_markdown, print_tables, tables
+    from benchmarks.scoring.tables import print_tables, tables
+    from er_gym.tables import as_markdown
 
     for name, given, refused in (
         ("--misses", misses, ("csv",)),

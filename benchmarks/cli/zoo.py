@@ -15,7 +15,7 @@ from benchmarks.terminal import echo, stdout
 if TYPE_CHECKING:
     from agents.zoo.card import Card, Figure, Rate
     from agents.zoo.index import ZooModel
-    from benchmarks.scoring.tables import Table
+    from er_gym.tables import Table
 
 FORMATS = ("table", "md")
 DTYPES = ("float16", "bfloat16", "float32")
@@ -48,7 +48,8 @@ def zoo(context: click.Context, layout: str) -> None:
     if context.invoked_subcommand is not None:
         return
     from agents.zoo.index import find_model, model_names
-    from benchmarks.scoring.tables import as_markdown, print_tables
+    from benchmarks.scoring.tables import print_tables
+    from er_gym.tables import as_markdown
 
     with bad_input():
         table = _list([find_model(name) for name in model_names()])
@@ -192,7 +193,7 @@ def _size(card: Card) -> str:
 
 
 def _list(models: list[ZooModel]) -> Table:
-    from benchmarks.scoring.tables import Table
+    from er_gym.tables import Table
 
     words = ("Name", "What it does", "Extra", "Tasks")
     return Table(
@@ -215,7 +216,7 @@ def _row(model: ZooModel, figure: Figure | None) -> tuple[str, ...]:
 
 
 def _figure_table(card: Card, figure: Figure) -> Table:
-    from benchmarks.scoring.tables import Table
+    from er_gym.tables import Table
 
     weights = card.dtype if figure.played_by != "run" else "the training run's weights"
     return Table(

@@ -13,9 +13,10 @@ from agents.vlm.tuned_model import agent_file
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import EXISTING_FOLDER
 from benchmarks.eyes.examine import Examiner, examine, figures
-from benchmarks.scoring.tables import as_markdown, print_tables
+from benchmarks.scoring.tables import print_tables
 from benchmarks.terminal import stdout
 from er_gym.data.frames import FrameSet
+from er_gym.tables import as_markdown
 
 _SIGHT = {"seeing": False, "blind": True}
 

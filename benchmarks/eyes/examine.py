@@ -13,11 +13,11 @@ import numpy as np
 from agents.vlm.chat import Message, Picture
 from agents.vlm.pictures import noise_like
 from agents.vlm.settings import AgentSettings
-from benchmarks.scoring.tables import Table
 from er_gym.data.dialects import load_dialect
 from er_gym.data.frame_chat import Question, questions, words_for_frames
 from er_gym.data.frames import Frame, FrameSet
 from er_gym.data.scene_text import FrameWords, SceneWords
+from er_gym.tables import Table
 from er_gym.tasks.reading import read_bytes
 from er_gym.thor.objects import TYPES
 from er_gym.writing import inside

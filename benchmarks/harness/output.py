@@ -13,8 +13,9 @@ import click
 from rich.console import Console
 from rich.progress import track
 
-from benchmarks.scoring.tables import Table, print_tables
+from benchmarks.scoring.tables import print_tables
 from benchmarks.terminal import terminal
+from er_gym.tables import Table
 from er_gym.writing import check_output, write_output
 
 FORMAT = "er-gym/figures/1"

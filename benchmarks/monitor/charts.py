@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
 
 from markupsafe import Markup
 
-MOST_POINTS = 500
-"""A series is drawn with no more points; neighbours are drawn as their mean, with their range."""
+from benchmarks.scoring.series import Axis, Chart, Point, Series, decimated
+
 _WIDTH, _HEIGHT = 480, 280
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58, 14, 12, 44
 _LEGEND_LINE, _LETTER = 17, 7.6
@@ -29,68 +28,14 @@ _DOTS = 5_000
 """From so many in thousands."""
 
 
-class Point(NamedTuple):
-    """A point of a series, and the interval or the range around it; equal to ``y`` for none."""
-
-    x: float
-    y: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class Series:
-    """A series.
-
-    Attributes:
-        name: in the legend.
-        points: in order.
-        kind: how it is drawn.
-        whiskers: whether the intervals are lines at the points rather than a band behind them.
-        named: whether each value stands beside its point.
-    """
-
-    name: str
-    points: Sequence[Point]
-    kind: Literal["line", "points", "bars"] = "line"
-    whiskers: bool = False
-    named: bool = False
-
-
-@dataclass(frozen=True)
-class Axis:
-    """An axis.
-
-    Attributes:
-        label: beside it.
-        low, high: its ends; None for the data's.
-        log: whether it is logarithmic. Points at 0 and below are then left out.
-        names: of the places 0, 1, 2 …, for an axis without numbers.
-        at: the places of the ticks; none for round ones.
-    """
-
-    label: str = ""
-    low: float | None = None
-    high: float | None = None
-    log: bool = False
-    names: Sequence[str] = ()
-    at: Sequence[float] = ()
-
-
-def points(pairs: Sequence[tuple[float, float]]) -> list[Point]:
-    """Points without an interval."""
-    return [Point(x, y, y, y) for x, y in pairs]
-
-
-def chart(name: str, title: str, x: Axis, y: Axis, series: Sequence[Series]) -> Markup:
-    """A chart; empty if no series has a point.
+def as_svg(name: str, chart: Chart) -> Markup:
+    """A chart as SVG; empty if no series has a point.
 
     Args:
-        name: unique in its page; its title and its description have ids made from it.
-        title: for readers who do not see it.
-        x, y: the axes.
-        series: at most eight, which look different.
+        name: unique in its page; the chart's title and description have ids made from it.
+        chart: what it shows.
     """
+    x, y, series = chart.x, chart.y, chart.series
     shown = [
         (
             _GREY if each.kind == "bars" and len(series) > 1 else number % _STYLES,
@@ -122,15 +67,7 @@ def chart(name: str, title: str, x: Axis, y: Axis, series: Sequence[Series]) -> 
     return Markup(
         '<svg class="chart" viewBox="0 0 {} {}" role="img" aria-labelledby="{}-title {}-desc">'
         '<title id="{}-title">{}</title><desc id="{}-desc">{}</desc>{}</svg>'
-    ).format(_WIDTH, _HEIGHT + top, name, name, name, title, name, described, body)
-
-
-def decimated(found: Sequence[Point], most: int = MOST_POINTS) -> list[Point]:
-    """At most so many points: neighbours become their mean, with the range of all of them."""
-    if len(found) <= most:
-        return list(found)
-    size = -(-len(found) // most)
-    return [_mean(found[begin : begin + size]) for begin in range(0, len(found), size)]
+    ).format(_WIDTH, _HEIGHT + top, name, name, name, chart.title, name, described, body)
 
 
 def round_ticks(low: float, high: float, about: int = 5) -> list[float]:
@@ -210,16 +147,6 @@ def _fitting(found: Sequence[Point], x: Axis, y: Axis) -> list[Point]:
             and not (y.log and point.low <= 0)
             and not (x.log and point.x <= 0)
         ]
-    )
-
-
-def _mean(found: Sequence[Point]) -> Point:
-    n = len(found)
-    return Point(
-        sum(point.x for point in found) / n,
-        sum(point.y for point in found) / n,
-        min(point.low for point in found),
-        max(point.high for point in found),
     )
 
 

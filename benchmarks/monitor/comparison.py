@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import comb, sqrt
+from math import comb
 from typing import Literal, TypeAlias
 
 from benchmarks.monitor.event_tail import EpisodeRow
+from benchmarks.scoring.metrics import normal
 
 Change: TypeAlias = Literal["gained", "lost", "both", "neither"]
 CHANGES: tuple[Change, ...] = ("gained", "lost", "both", "neither")
 """Which of two runs a task is a success in: only the second, only the first, both, neither."""
-_NORMAL = 1.959963984540054  # the 97.5 % point of the normal distribution
 
 
 @dataclass(frozen=True)
@@ -75,21 +75,16 @@ def difference(name: str, pairs: Sequence[Pair]) -> Difference:
         counts[pair.change] += 1
     n = len(pairs)
     gained, lost = counts["gained"], counts["lost"]
-    mean = (gained - lost) / n if n else 0.0
-    low = high = None
-    if n > 1:
-        # Each pair differs by 1, -1 or 0.
-        half = _NORMAL * sqrt(max(0.0, (gained + lost) / n - mean * mean) / (n - 1))
-        low, high = max(-1.0, mean - half), min(1.0, mean + half)
+    every = normal([1.0] * gained + [-1.0] * lost + [0.0] * (n - gained - lost) or [0.0])
     return Difference(
         name=name,
         n=n,
         counts=counts,
         first=(counts["both"] + lost) / n if n else 0.0,
         second=(counts["both"] + gained) / n if n else 0.0,
-        difference=mean,
-        low=low,
-        high=high,
+        difference=every.mean,
+        low=None if every.low is None else max(-1.0, every.low),
+        high=None if every.high is None else min(1.0, every.high),
         chance=mcnemar(gained, lost),
     )
 

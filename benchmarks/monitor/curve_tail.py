@@ -1,6 +1,6 @@
 """Follows a log of figures, one JSON object a line, while it grows.
 
-However long the log is, of each figure no more than :data:`~benchmarks.monitor.charts.MOST_POINTS`
+However long the log is, of each figure no more than :data:`~benchmarks.scoring.series.MOST_POINTS`
 points are kept: neighbours become their mean, with the range of all of them.
 """
 
@@ -15,8 +15,8 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from benchmarks.monitor.charts import MOST_POINTS, Point
 from benchmarks.monitor.line_tail import LineFollower, Lines
+from benchmarks.scoring.series import MOST_POINTS, Point
 
 _JSON: TypeAdapter[Any] = TypeAdapter(Any)
 _MOST_NAMES = 100

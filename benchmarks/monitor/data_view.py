@@ -7,11 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from benchmarks.monitor.charts import Axis, Series, chart, points
+from benchmarks.monitor.charts import as_svg
 from benchmarks.monitor.collection_index import CollectionIndex, Head
 from benchmarks.monitor.flow import flow
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.listing import AddressFilter
+from benchmarks.scoring.series import Axis, Chart, Series, points
 from er_gym.data import paper_figures as paper
 from er_gym.data.statistics import STATES, mean_and_most
 from er_gym.data.trajectory import TAG_OF_KIND, THOUGHT_KINDS, PictureRecord, Trajectory, Turn
@@ -112,11 +113,11 @@ def overview(index: CollectionIndex, t: Translator) -> dict[str, Any]:
         "flow": flow(
             "flow", t("what_follows"), found.transitions, states, (t("after_this"), t("comes_this"))
         ),
-        "lengths": chart(
-            "lengths", t("by_turns"), Axis(t("turns"), low=0.0, high=longest + 1.0),
+        "lengths": as_svg("lengths", Chart(
+            t("by_turns"), Axis(t("turns"), low=0.0, high=longest + 1.0),
             Axis(t("trajectories"), low=0.0),
             [Series(t("trajectories"), points(lengths), "bars")],
-        ) if heads else "",
+        )) if heads else "",
     }  # fmt: skip
 
 

@@ -5,34 +5,25 @@ The figures are those of its evaluations' pages: read from their event streams, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import yaml
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
-from benchmarks.ablation.phases import evaluation_of
-from benchmarks.ablation.phases import plan_of as plan_of_ablation
-from benchmarks.ablation.settings import AblationSettings
-from benchmarks.ladder.paper_rungs import PAPER
-from benchmarks.ladder.phases import plan_of as plan_of_ladder
-from benchmarks.ladder.phases import rungs
-from benchmarks.ladder.settings import LadderSettings
-from benchmarks.monitor.charts import Axis, Point, Series, chart
+from benchmarks.monitor.charts import as_svg
 from benchmarks.monitor.growth import changed, in_use
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.places import Place
 from benchmarks.monitor.run_view import RunSummary, Tally
-from benchmarks.plan.run import Plan, PlanRecord
+from benchmarks.scoring.metrics import Estimate
+from benchmarks.study.charts import Shown
+from benchmarks.study.kinds import KINDS, Study
+from benchmarks.study.phase import Measurement
+from benchmarks.study.run import PlanRecord
 from er_gym.tasks.errors import TaskFileError, first_problem
 from er_gym.tasks.reading import read_text
-
-_MAKERS: Mapping[str, tuple[type[BaseModel], Callable[[Any, Path], Plan]]] = {
-    "ladder": (LadderSettings, plan_of_ladder),
-    "ablation": (AblationSettings, plan_of_ablation),
-}
 
 
 class Inside(Protocol):
@@ -81,10 +72,18 @@ class Measured:
     success: Tally
     groups: Mapping[str, Tally]
 
+    @property
+    def shown(self) -> Shown:
+        """As a chart shows it."""
+        rate = self.success.rate
+        success = None if rate is None else Estimate(rate, self.success.low, self.success.high)
+        rates = [run.success.rate for run in self.runs if run.success.rate is not None]
+        return Shown(self.name, self.faults, success, rates)
+
 
 @dataclass(frozen=True)
-class StudyView:
-    """Rows of an ablation that are compared; ``chart`` shows their success."""
+class PartView:
+    """Models that are compared; ``chart`` shows their success."""
 
     title: str
     rows: Sequence[Measured]
@@ -120,13 +119,16 @@ class PlanView:
 
 def plan_view(place: Place, inside: Inside) -> tuple[PlanView, Any]:
     """A ladder or an ablation, and its settings; None if they cannot be read."""
-    model, make = _MAKERS[place.kind]
+    kind = KINDS[place.kind]
     file = place.path / f"{place.kind}.json"
     settings, problem, record, phases = None, "", None, []
     try:
         record = PlanRecord.model_validate_json(read_text(file))
-        settings = model.model_validate(record.settings)
-        phases = [(each.name, str(each), each.out) for each in make(settings, place.path).phases]
+        settings = kind.settings.model_validate(record.settings)
+        phases = [
+            (each.name, str(each), each.out)
+            for each in Study(kind, place.path, settings).plan.phases
+        ]
     except ValidationError as error:
         problem = f"{file.name}: {first_problem(error)}"
     except (TaskFileError, ValueError, OSError) as error:
@@ -161,76 +163,21 @@ def plan_view(place: Place, inside: Inside) -> tuple[PlanView, Any]:
     return view, settings
 
 
-def ladder_rows(settings: LadderSettings, inside: Inside) -> list[Measured]:
-    """The rungs of a ladder."""
-    return [_measured(rung.name, rung.faults, [rung.run], inside) for rung in rungs(settings)]
-
-
-def studies(settings: AblationSettings, inside: Inside, t: Translator) -> list[StudyView]:
-    """The studies of an ablation."""
-    rows = {
-        name: _measured(name, 0.0, [evaluation_of(name, s) for s in settings.seeds], inside)
-        for name in settings.rows
-    }
-    found: list[StudyView] = []
-    for name, study in settings.studies.items():
-        own = [rows[each] for each in study.rows]
-        places = study.numbers or range(len(own))
-        x = (
-            Axis(study.axis, log=True, at=study.numbers)
-            if study.numbers
-            else Axis("", names=[each.name for each in own])
-        )
-        seeds = [
-            (place, 100 * run.success.rate)
-            for place, row in zip(places, own, strict=True)
-            for run in row.runs
-            if run.success.rate is not None
-        ]
-        series = [
-            Series(t("all_seeds"), _points(places, own), "line" if study.numbers else "points",
-                   whiskers=True, named=True),
-            Series(t("each_seed"), [Point(x, y, y, y) for x, y in seeds], "points"),
-        ]  # fmt: skip
-        several = len(settings.seeds) > 1
-        picture = chart(
-            f"study-{len(found)}", study.title, x, Axis("%", low=0.0), series[: 1 + several]
-        )
-        found.append(StudyView(study.title or name, own, picture))
+def part_views(kind: str, settings: Any, inside: Inside, t: Translator) -> list[PartView]:
+    """The models of a ladder or an ablation that are compared."""
+    found: list[PartView] = []
+    for part in KINDS[kind].parts(settings):
+        rows = [_measured(each, inside) for each in part.measured]
+        chart = part.chart([row.shown for row in rows], t)
+        if kind == "ladder":
+            chart = replace(chart, title=t("success_by_stage"))
+        picture = as_svg(f"part-{len(found)}", chart)
+        found.append(PartView(chart.title or part.name, rows, picture))
     return found
 
 
-def ladder_chart(rows: Sequence[Measured], t: Translator) -> Any:
-    """Success after each stage, beside the paper's; empty before the first episode."""
-    names = list(dict.fromkeys(row.name for row in rows))
-    paper = [
-        Point(float(place), PAPER[name].success, PAPER[name].success, PAPER[name].success)
-        for place, name in enumerate(names)
-        if name in PAPER
-    ]
-    lines = []
-    for rate in dict.fromkeys(row.faults for row in rows):
-        own = [row for row in rows if row.faults == rate]
-        found = _points([names.index(row.name) for row in own], own)
-        name = t("with_faults", rate=f"{100 * rate:g}") if rate else t("this_ladder")
-        lines.append(Series(name, found, whiskers=True, named=True))
-    if not any(line.points for line in lines):
-        return ""
-    lines.append(Series(t("paper_models"), paper, "bars", named=True))
-    x, y = Axis("", names=names), Axis(t("success_percent"), 0.0, 100.0)
-    return chart("ladder", t("success_by_stage"), x, y, lines)
-
-
-def _points(places: Sequence[float], rows: Sequence[Measured]) -> list[Point]:
-    return [
-        Point(float(place), 100 * tally.rate, 100 * tally.low, 100 * tally.high)
-        for place, tally in ((place, row.success) for place, row in zip(places, rows, strict=True))
-        if tally.rate is not None and tally.low is not None and tally.high is not None
-    ]
-
-
-def _measured(name: str, faults: float, outs: Sequence[str], inside: Inside) -> Measured:
-    places = [inside.place(out) for out in outs]
+def _measured(of: Measurement, inside: Inside) -> Measured:
+    places = [inside.place(out) for out in of.runs.values()]
     told = [inside.run(place) for place in places if place is not None and place.kind == "run"]
     runs = [summary for summary, _ in told]
     by_group: dict[str, list[Tally]] = {}
@@ -238,10 +185,10 @@ def _measured(name: str, faults: float, outs: Sequence[str], inside: Inside) -> 
         for tally in groups:
             by_group.setdefault(tally.name, []).append(tally)
     return Measured(
-        name=name,
-        faults=faults,
+        name=of.name,
+        faults=of.faults,
         runs=runs,
-        success=_sum(name, [run.success for run in runs]),
+        success=_sum(of.name, [run.success for run in runs]),
         groups={group: _sum(group, tallies) for group, tallies in by_group.items()},
     )
 

@@ -10,12 +10,13 @@ from typing import Any
 
 import yaml
 
-from benchmarks.monitor.charts import Axis, Series, chart
+from benchmarks.monitor.charts import as_svg
 from benchmarks.monitor.curve_tail import CurveTail, last_line
 from benchmarks.monitor.followed import Followed
 from benchmarks.monitor.growth import changed, in_use
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.places import Place
+from benchmarks.scoring.series import Axis, Chart, Series
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.reading import parse_json, read_text, read_yaml
 
@@ -168,7 +169,9 @@ def policy_charts(tail: CurveTail, t: Translator) -> list[tuple[str, Any]]:
         ("speed", t("steps_per_second"), Axis("", low=0.0),
          [Series(t("steps_per_second"), tail.points("time/fps"))]),
     )  # fmt: skip
-    drawn = [(title, chart(name, title, steps, y, lines)) for name, title, y, lines in wanted]
+    drawn = [
+        (title, as_svg(name, Chart(title, steps, y, lines))) for name, title, y, lines in wanted
+    ]
     return [(title, picture) for title, picture in drawn if picture]
 
 
@@ -182,7 +185,7 @@ def finetuning_charts(tail: CurveTail, t: Translator) -> list[tuple[str, Any]]:
         ("gradient_norm", Axis("", low=0.0)),
     )
     drawn = [
-        (t(name), chart(name, t(name), updates, y, [Series(t(name), tail.points(name))]))
+        (t(name), as_svg(name, Chart(t(name), updates, y, [Series(t(name), tail.points(name))])))
         for name, y in wanted
     ]
     return [(title, picture) for title, picture in drawn if picture]

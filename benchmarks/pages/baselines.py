@@ -35,12 +35,12 @@ from benchmarks.harness.output import ROOT
 from benchmarks.scoring.curves import draw_curves
 from benchmarks.scoring.metrics import Score, score_episode, wilson
 from benchmarks.scoring.scorers import CORRECTED
-from benchmarks.scoring.tables import Table, as_markdown
 from er_gym import __version__
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.outcomes import Outcomes
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.rollout.runner import run
+from er_gym.tables import Table, as_markdown
 from er_gym.tasks import jsonl_format, load_suite
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import GROUPS

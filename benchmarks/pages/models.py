@@ -10,78 +10,30 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from agents.finetune.run_files import METRICS
-from benchmarks.ablation.chart import draw_study
-from benchmarks.ablation.result import read_study, study_table
-from benchmarks.ablation.settings import AblationSettings
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import force_option
 from benchmarks.harness.output import ROOT
-from benchmarks.ladder.chart import draw_ladder
-from benchmarks.ladder.phases import Rung, plan_of, rungs
-from benchmarks.ladder.result import read_results, result_tables
-from benchmarks.ladder.settings import CONTROLS, LadderSettings
 from benchmarks.pages.baselines import machine
 from benchmarks.pages.failure_maps import draw_examples, examples, failure_shares, in_words
-from benchmarks.plan.run import PlanRecord
-from benchmarks.scoring.drawing import GRID, INK, MUTED, canvas, own_style, write_chart
+from benchmarks.scoring.drawing import draw, write_charts
 from benchmarks.scoring.report import RunReport, load_run
+from benchmarks.scoring.series import Axis, Chart, Series, points
 from benchmarks.scoring.splits import split_results, split_table
-from benchmarks.scoring.tables import Table, as_markdown
-from er_gym.rollout.run_directory import MANIFEST
+from benchmarks.study.kinds import ABLATION, LADDER, Study
+from benchmarks.study.ladder_settings import CONTROLS
+from benchmarks.study.results import Result
+from benchmarks.study.run import PlanRecord
+from er_gym.tables import Table, as_markdown
 from er_gym.writing import MARKDOWN_MARK, check_output, write_output
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-_COLOURS = ("#2470ad", "#2a8c82", "#b5762a", "#54278f", "#a33b4a")
 _SMOOTH = 0.9
 """The share that the mean of the losses before has in a point of the curve."""
-
-
-@dataclass(frozen=True)
-class Climbed:
-    """A ladder that was climbed, as far as it was.
-
-    Attributes:
-        path: its directory, which has the name of its configuration.
-        settings: of the ladder.
-        record: what has been done.
-    """
-
-    path: Path
-    settings: LadderSettings
-    record: PlanRecord
-
-    @staticmethod
-    def load(path: Path) -> Climbed:
-        """Read it.
-
-        Raises:
-            ValueError: it is no directory of a ladder.
-            OSError: it cannot be read.
-        """
-        record = PlanRecord.model_validate_json((path / "ladder.json").read_bytes())
-        return Climbed(path, LadderSettings.model_validate(record.settings), record)
-
-    @property
-    def name(self) -> str:
-        """Of its configuration."""
-        return self.path.name
-
-    def measured(self) -> list[tuple[Rung, RunReport]]:
-        """The rungs that have been measured, and their runs."""
-        return [
-            (rung, load_run(self.path / rung.run))
-            for rung in rungs(self.settings)
-            if (self.path / rung.run / MANIFEST).exists()
-        ]
 
 
 @click.command()
@@ -109,45 +61,59 @@ def main(
         raise click.UsageError("give --ladder or --ablation")
     with bad_input():
         check_output(out, force=force)
-        climbed = [Climbed.load(path) for path in ladders]
-        parts = [_ladder_section(each, out.parent / "images", force) for each in climbed]
-        parts += _generalisation(climbed, others)
-        parts += [_ablation_section(path, out.parent / "images", force) for path in ablations]
+        climbed = [Study.open(LADDER, path) for path in ladders]
+        parts = [_ladder_section(*each, out.parent / "images", force) for each in climbed]
+        parts += _generalisation([ladder for ladder, _ in climbed], others)
+        ablated = [Study.open(ABLATION, path) for path in ablations]
+        parts += [_ablation_section(*each, out.parent / "images", force) for each in ablated]
         page = MARKDOWN_MARK + _INTRODUCTION.format(machine=machine()) + "\n".join(parts)
         write_output(out, page, force=force)
     click.echo(out)
 
 
-def _ladder_section(ladder: Climbed, images: Path, force: bool) -> str:
-    """What a ladder has come to."""
-    name, settings = ladder.name, ladder.settings
-    results = read_results(settings, ladder.path)
-    runs = ladder.measured()
-    pictures = {
-        f"{name}-ladder.png": draw_ladder(results, f"{name}: success after each stage"),
-        f"{name}-loss.png": _draw_losses(ladder),
-    }
-    last = [run for rung, run in runs if not rung.faults and rung.name not in CONTROLS][-1]
-    chosen = examples(last.episodes)
-    if chosen:
-        pictures[f"{name}-failures.png"] = draw_examples(last.manifest, chosen)
-    for file, figure in pictures.items():
-        write_chart(images / file, figure, force=force, dpi=100)
-    lines = [
-        f"## {name}",
+def _run_of(result: Result) -> RunReport:
+    """The only evaluation of a rung."""
+    (run,) = result.runs.values()
+    return run
+
+
+def _heading(study: Study, title: str, command: str) -> list[str]:
+    """A study's title, what it is, and how it is run."""
+    out = f"runs/{study.kind.name}/{study.path.name}"
+    return [
+        f"## {title}",
         "",
-        settings.description,
+        study.settings.description,
         "",
         "```sh",
-        f"er-gym ladder --config {name} --out runs/ladder/{name}",
+        f"er-gym {command} --config {study.path.name} --out {out}",
         "```",
         "",
-        as_markdown(result_tables(results)),
+    ]
+
+
+def _ladder_section(ladder: Study, record: PlanRecord, images: Path, force: bool) -> str:
+    """What a ladder has come to."""
+    name = ladder.path.name
+    ((part, results),) = ladder.results()
+    success = replace(part.picture(results), title=f"{name}: success after each stage")
+    pictures = {
+        f"{name}-ladder": draw(success),
+        f"{name}-loss": draw(_losses(ladder), height=3.6),
+    }
+    last = _run_of([r for r in results if not r.of.faults and r.name not in CONTROLS][-1])
+    chosen = examples(last.episodes)
+    if chosen:
+        pictures[f"{name}-failures"] = draw_examples(last.manifest, chosen)
+    write_charts(images, pictures, force=force)
+    lines = [
+        *_heading(ladder, name, "ladder"),
+        as_markdown(part.tables(results)),
         f"![Success after each stage](images/{name}-ladder.png)",
         "",
         f"![Loss of each fine-tuning](images/{name}-loss.png)",
         "",
-        as_markdown([_failure_table(runs), _cost_table(ladder)]),
+        as_markdown([_failure_table(results), _cost_table(record)]),
     ]
     if chosen:
         lines += [
@@ -166,9 +132,9 @@ def _ladder_section(ladder: Climbed, images: Path, force: bool) -> str:
     return "\n".join(lines)
 
 
-def _failure_table(runs: Sequence[tuple[Rung, RunReport]]) -> Table:
+def _failure_table(results: Sequence[Result]) -> Table:
     """Why the episodes of each rung failed."""
-    shares = [failure_shares(run.episodes) for _, run in runs]
+    shares = [failure_shares(_run_of(each).episodes) for each in results]
     kinds = list(dict.fromkeys(kind for each in shares for kind in each))
     return Table(
         title="Why episodes failed, in % of all",
@@ -176,18 +142,18 @@ def _failure_table(runs: Sequence[tuple[Rung, RunReport]]) -> Table:
         rows=tuple(
             (
                 rung.name,
-                f"{100 * rung.faults:g}",
+                f"{100 * rung.of.faults:g}",
                 *(f"{100 * each.get(kind, 0.0):.1f}" for kind in kinds),
             )
-            for (rung, _), each in zip(runs, shares, strict=True)
+            for rung, each in zip(results, shares, strict=True)
         ),
         text_columns=1,
     )
 
 
-def _cost_table(ladder: Climbed) -> Table:
+def _cost_table(record: PlanRecord) -> Table:
     """How long each phase took."""
-    phases = ladder.record.done
+    phases = record.done
     total = sum(each.seconds for each in phases)
     rows = [(each.name, f"er-gym {each.command[0]}", _minutes(each.seconds)) for each in phases]
     return Table(
@@ -202,40 +168,33 @@ def _minutes(seconds: float) -> str:
     return f"{seconds / 60:.1f}"
 
 
-@own_style()
-def _draw_losses(ladder: Climbed) -> Figure:
-    """The loss of each fine-tuning over its updates."""
-    figure, axes = canvas(8.5, 3.6, f"{ladder.name}: loss of the tokens that are learnt")
-    tuned = [
-        phase
-        for phase in plan_of(ladder.settings, ladder.path).phases
-        if phase.command[0] == "finetune" and (ladder.path / phase.out / METRICS).exists()
-    ]
+def _losses(ladder: Study) -> Chart:
+    """The loss of each fine-tuning over the updates of all."""
+    series = []
     before = 0
-    for colour, phase in zip(_COLOURS, tuned, strict=False):
-        told = (ladder.path / phase.out / METRICS).read_text(encoding="utf-8").splitlines()
-        lines = [json.loads(line) for line in told]
+    for phase in ladder.plan.phases:
+        file = ladder.path / phase.out / METRICS
+        if phase.command[0] != "finetune" or not file.exists():
+            continue
+        lines = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
         losses = [line["loss"] for line in lines]
         for number in range(1, len(losses)):
             losses[number] = _SMOOTH * losses[number - 1] + (1 - _SMOOTH) * losses[number]
         updates = [before + line["update"] for line in lines]
-        axes.plot(updates, losses, color=colour, linewidth=1.4, label=phase.name)
+        series.append(Series(phase.name, points([*zip(updates, losses, strict=True)])))
         before = updates[-1]
-    axes.set_yscale("log")
-    axes.set_xlabel("updates", color=MUTED)
-    axes.set_ylabel("loss per token", color=MUTED)
-    axes.grid(color=GRID, linewidth=0.8)
-    axes.legend(frameon=False, labelcolor=INK)
-    return figure
+    title = f"{ladder.path.name}: loss of the tokens that are learnt"
+    return Chart(title, Axis("updates"), Axis("loss per token", log=True), series)
 
 
-def _generalisation(ladders: Iterable[Climbed], others: Iterable[tuple[str, Path]]) -> list[str]:
+def _generalisation(ladders: Iterable[Study], others: Iterable[tuple[str, Path]]) -> list[str]:
     """How new the tasks are that the models and others have done; nothing if there are none."""
     named = [
-        (ladder.name, run)
+        (ladder.path.name, _run_of(rung))
         for ladder in ladders
-        for rung, run in ladder.measured()
-        if not rung.faults and rung.name == [*ladder.settings.stages][-1]
+        for _, results in ladder.results()
+        for rung in results
+        if not rung.of.faults and rung.name == [*ladder.settings.stages][-1]
     ]
     named += [(name, load_run(path)) for name, path in others]
     reports = [
@@ -247,30 +206,17 @@ def _generalisation(ladders: Iterable[Climbed], others: Iterable[tuple[str, Path
     return [f"## How far it carries\n\n{as_markdown([split_table(split_results(reports))])}"]
 
 
-def _ablation_section(path: Path, images: Path, force: bool) -> str:
+def _ablation_section(ablation: Study, record: PlanRecord, images: Path, force: bool) -> str:
     """The tables and pictures of an ablation."""
-    record = PlanRecord.model_validate_json((path / "ablation.json").read_bytes())
-    settings = AblationSettings.model_validate(record.settings)
-    name = path.name
-    lines = [
-        f"## Ablations: {name}",
-        "",
-        settings.description,
-        "",
-        "```sh",
-        f"er-gym ablate --config {name} --out runs/ablation/{name}",
-        "```",
-        "",
-    ]
-    for key, study in settings.studies.items():
-        rows = read_study(settings, study, path)
-        if not rows:
-            continue
-        lines.append(as_markdown([study_table(study, rows)]))
-        if study.numbers:
-            file = f"ablation-{name}-{key}.png"
-            write_chart(images / file, draw_study(study, rows), force=force, dpi=100)
-            lines += [f"![{study.title}](images/{file})", ""]
+    name = ablation.path.name
+    lines = _heading(ablation, f"Ablations: {name}", "ablate")
+    for part, results in ablation.results():
+        lines.append(as_markdown(part.tables(results)))
+        if part.pictured:
+            chart = part.picture(results)
+            picture = {f"ablation-{name}-{part.name}": draw(chart)}
+            (file,) = write_charts(images, picture, force=force)
+            lines += [f"![{chart.title}](images/{file.name})", ""]
     minutes = _minutes(sum(each.seconds for each in record.done))
     lines += [f"All of it took {minutes} minutes.", ""]
     return "\n".join(lines)

@@ -1,22 +1,18 @@
-"""Learning curves as pictures, drawn with matplotlib."""
+"""Learning curves as pictures."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from benchmarks.scoring.drawing import new_figure, own_style, write_chart
-from er_gym.writing import make_folder
+from benchmarks.scoring.drawing import draw, write_charts
+from benchmarks.scoring.series import Axis, Chart, Point, Series
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-_COLORS = ("#2470ad", "#b5762a", "#2a8c82", "#54278f", "#a33b4a", "#5b6b2f")
-_INK, _MUTED, _GRID = "#222222", "#666666", "#e4e4e4"
 _POINTS = 200
+_OVER = {"steps": (1e-3, "thousand steps"), "seconds": (1 / 60, "minutes")}
 _PANELS = {
     "rollout/success_rate": "while it trains, training rooms",
     "eval/success_rate": "held out, unseen rooms",
@@ -31,7 +27,6 @@ class HasCurve(Protocol):
         """Lines with ``steps`` and the logged values."""
 
 
-@own_style()
 def draw_curves(
     families: Mapping[str, Sequence[HasCurve]], out: Path, *, force: bool = True
 ) -> list[Path]:
@@ -43,55 +38,33 @@ def draw_curves(
 
     Raises:
         ImportError: matplotlib is not installed.
+        ForeignFile, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
-    make_folder(out)
-    made = []
-    for over, scale, label in (("steps", 1e-3, "thousand steps"), ("seconds", 1 / 60, "minutes")):
-        figure = new_figure(11, 4.2)
-        for axes, (key, title) in zip(
-            figure.subplots(1, 2, sharey=True), _PANELS.items(), strict=True
-        ):
-            for color, (name, runs) in zip(_COLORS, families.items(), strict=False):
-                _draw_family(axes, runs, key, over, scale, color, name)
-            _style_axes(axes, title, label)
-        figure.axes[0].set_ylabel("success, %", color=_MUTED)
-        figure.axes[1].legend(frameon=False, labelcolor=_INK, loc="lower right")
-        file = out / f"learning_{over}.png"
-        write_chart(file, figure, force=force, dpi=100)
-        made.append(file)
-    return made
+    figures = {}
+    for over, (scale, label) in _OVER.items():
+        panels = [
+            Chart(
+                title,
+                Axis(label),
+                Axis("success, %", 0.0, 100.0),
+                [Series(name, _mean(runs, key, over, scale)) for name, runs in families.items()],
+            )
+            for key, title in _PANELS.items()
+        ]
+        figures[f"learning_{over}"] = draw(*panels, width=11, height=4.2)
+    return write_charts(out, figures, force=force)
 
 
-def _draw_family(
-    axes: Axes,
-    runs: Sequence[HasCurve],
-    key: str,
-    over: str,
-    scale: float,
-    color: str,
-    name: str,
-) -> None:
+def _mean(runs: Sequence[HasCurve], key: str, over: str, scale: float) -> list[Point]:
+    """The mean of some curves, with the lowest and the highest, where all of them have values."""
     lines = []
     for run in runs:
         points = [(line[over] * scale, 100 * line[key]) for line in run.curve if key in line]
         if points:
             lines.append(np.array(points).T)
     if not lines:
-        return
+        return []
     at = np.linspace(max(x[0] for x, _ in lines), min(x[-1] for x, _ in lines), _POINTS)
     values = np.array([np.interp(at, x, y) for x, y in lines])
-    axes.plot(at, values.mean(axis=0), color=color, label=name, linewidth=1.8)
-    if len(lines) > 1:
-        axes.fill_between(
-            at, values.min(axis=0), values.max(axis=0), color=color, alpha=0.18, linewidth=0
-        )
-
-
-def _style_axes(axes: Axes, title: str, label: str) -> None:
-    axes.set_title(title, loc="left", fontsize=11, color=_INK)
-    axes.set_xlabel(label, color=_MUTED)
-    axes.set_ylim(0, 100)
-    axes.grid(color=_GRID, linewidth=0.8)
-    axes.tick_params(length=0, labelcolor=_MUTED)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
+    ends = values.mean(axis=0), values.min(axis=0), values.max(axis=0)
+    return [Point(*map(float, point)) for point in zip(at, *ends, strict=True)]

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from benchmarks.scoring.tables import Table
+from benchmarks.scoring.tables import NONE
 from er_gym.data import paper_figures as paper
 from er_gym.data.statistics import STATES, Statistics, mean_and_most
 from er_gym.data.trajectory import THOUGHT_KINDS
-
-_NONE = "-"
+from er_gym.tables import Table
 
 
 def statistics_tables(found: Statistics) -> list[Table]:
@@ -56,7 +55,7 @@ def _parts(found: Statistics) -> Table:
         kinds = ", ".join(f"{kind} {number:,}" for kind, number in sorted(part.kinds.items()))
         rows.append(
             (
-                name or _NONE,
+                name or NONE,
                 kinds,
                 f"{part.trajectories:,}",
                 _percent(part.succeeded, part.trajectories),
@@ -72,11 +71,11 @@ def _parts(found: Statistics) -> Table:
             rows.append(
                 (
                     f"the paper's set {one.stage}",
-                    _NONE,
+                    NONE,
                     f"{one.trajectories:,}",
-                    _NONE,
+                    NONE,
                     f"{one.actions:.2f}",
-                    _NONE,
+                    NONE,
                     f"{one.pictures / one.trajectories:.2f}",
                     f"{one.most_pictures}",
                 )
@@ -96,7 +95,7 @@ def _thoughts(found: Statistics) -> Table:
             f"{found.thoughts[kind]:,}",
             _percent(found.thoughts[kind], found.all_thoughts),
             _percent(paper.THOUGHTS[kind], of_paper),
-            f"{found.words[kind] / found.thoughts[kind]:.1f}" if found.thoughts[kind] else _NONE,
+            f"{found.words[kind] / found.thoughts[kind]:.1f}" if found.thoughts[kind] else NONE,
         )
         for kind in THOUGHT_KINDS
     )
@@ -121,7 +120,7 @@ def _transitions(found: Statistics) -> Table:
 def _both(shares: Mapping[str, Mapping[str, float]], state: str, after: str) -> str:
     ours = shares.get(state, {}).get(after, 0.0)
     theirs = paper.TRANSITIONS[state].get(after, 0)
-    return f"{ours:.0f} ({theirs:.0f})" if ours or theirs else _NONE
+    return f"{ours:.0f} ({theirs:.0f})" if ours or theirs else NONE
 
 
 def _compared(title: str, what: str, ours: Mapping[str, int], theirs: Mapping[str, int]) -> Table:
@@ -133,7 +132,7 @@ def _compared(title: str, what: str, ours: Mapping[str, int], theirs: Mapping[st
             name,
             f"{ours.get(name, 0):,}",
             _percent(ours.get(name, 0), mine),
-            _percent(theirs[name], its) if name in theirs else _NONE,
+            _percent(theirs[name], its) if name in theirs else NONE,
         )
         for name in names
     )
@@ -168,4 +167,4 @@ def _sum(counts: Sequence[Mapping[str, int]]) -> dict[str, int]:
 
 
 def _percent(number: float, of: float, digits: int = 1) -> str:
-    return f"{100 * number / of:.{digits}f}" if of else _NONE
+    return f"{100 * number / of:.{digits}f}" if of else NONE

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-import io
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from er_gym.rollout.causes import CauseCount, causes_in, count_causes
 from er_gym.rollout.judgement import lacks_search_targets
 from er_gym.rollout.records import EpisodeRecord, episode_key
 from er_gym.rollout.run_directory import Manifest, RunDirectory
+from er_gym.tables import Table
 from er_gym.tasks.errors import describe_substitutions
 from er_gym.tasks.types import BY_NAME, GROUPS
 
@@ -160,15 +160,20 @@ def _miss(episode: EpisodeRecord, scored: Score) -> Miss:
     )
 
 
+def _parts(scores: Sequence[Score]) -> list[tuple[str, str, Sequence[Score]]]:
+    """(level, name, scores) overall, for each group and for each task type that was played, in the
+    order of the paper's table and of the table of task types."""
+    groups, types = by(scores, lambda each: each.group), by(scores, lambda each: each.task_type)
+    return [
+        *([("overall", "all", scores)] if scores else []),
+        *(("group", name, groups[name]) for name in GROUPS if name in groups),
+        *(("type", name, types[name]) for name in BY_NAME if name in types),
+    ]
+
+
 def slices(scores: Sequence[Score]) -> list[tuple[str, str, Summary]]:
     """(level, name, summary) overall, for each group and for each task type that was played."""
-    if not scores:
-        return []
-    return [
-        ("overall", "all", summarise(scores)),
-        *(("group", *each) for each in by_group(scores).items()),
-        *(("type", *each) for each in by_type(scores).items()),
-    ]
+    return [(level, name, summarise(part)) for level, name, part in _parts(scores)]
 
 
 def sample_slices(scores: Sequence[Score]) -> list[tuple[str, str, TaskSamples]]:
@@ -176,24 +181,13 @@ def sample_slices(scores: Sequence[Score]) -> list[tuple[str, str, TaskSamples]]
     samples = most_samples(scores)
     if samples < 2:
         return []
-    groups, types = by(scores, lambda each: each.group), by(scores, lambda each: each.task_type)
-    parts = [
-        ("overall", "all", scores),
-        *(("group", name, groups[name]) for name in GROUPS if name in groups),
-        *(("type", name, types[name]) for name in BY_NAME if name in types),
-    ]
-    found = [(level, name, task_samples(part, samples)) for level, name, part in parts]
+    found = [(level, name, task_samples(part, samples)) for level, name, part in _parts(scores)]
     return [(level, name, counted) for level, name, counted in found if counted is not None]
 
 
 def by_group(scores: Sequence[Score]) -> dict[str, Summary]:
     """Summaries of the groups that were played, in the order of the paper's table."""
     return summarise_by(scores, lambda each: each.group, GROUPS)
-
-
-def by_type(scores: Sequence[Score]) -> dict[str, Summary]:
-    """Summaries of the task types that were played, in the order of the table of task types."""
-    return summarise_by(scores, lambda each: each.task_type, BY_NAME)
 
 
 def as_json(runs: Sequence[RunReport]) -> str:
@@ -256,26 +250,24 @@ def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = Fal
     stands for one that a scene lacks, has a line without figures; so does a file that is not an
     episode, and a cause that records name.
     """
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
     columns = [f"{metric}{end}" for metric in METRICS for end in ("", "_low", "_high")]
-    writer.writerow(["run", "agent", "suite", "protocol", "scorer", "level", "name", "n", *columns])
+    rows: list[tuple[object, ...]] = []
     for run in runs:
         manifest = run.manifest
-        head = [str(run.path), manifest.agent, manifest.suite, manifest.protocol]
+        head = (run.path, manifest.agent, manifest.suite, manifest.protocol)
         for name, scores in run.shown(scorer).items():
             for level, part, summary in slices(scores):
                 if level == "type" and not with_types:
                     continue
-                estimates = [dataclasses.astuple(summary[metric]) for metric in METRICS]
-                numbers = [number for estimate in estimates for number in estimate]
-                writer.writerow([*head, name, level, part, summary.n, *numbers])
+                estimates = (dataclasses.astuple(summary[metric]) for metric in METRICS)
+                rows.append((*head, name, level, part, summary.n, *chain(*estimates)))
         for level, lines in (
             ("set aside", map(str, run.manifest.set_aside)),
             ("taken", describe_substitutions(run.manifest.taken)),
             ("not counted", run.unusable),
             ("cause", run.causes_in_words),
         ):
-            for line in lines:
-                writer.writerow([*head, "", level, line, 0, *[""] * len(columns)])
-    return out.getvalue()
+            rows += ((*head, "", level, line, 0, *[""] * len(columns)) for line in lines)
+    told = ("run", "agent", "suite", "protocol", "scorer", "level", "name", "n", *columns)
+    cells = (tuple("" if cell is None else str(cell) for cell in row) for row in rows)
+    return Table("", told, tuple(cells), 7).csv()

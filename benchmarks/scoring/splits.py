@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from benchmarks.scoring.metrics import Score, Summary, summarise
 from benchmarks.scoring.report import RunReport
 from benchmarks.scoring.scorers import CORRECTED
-from benchmarks.scoring.tables import Table, interval, percent
+from benchmarks.scoring.tables import interval, percent
 from er_gym.rollout.records import EpisodeRecord
+from er_gym.tables import Table
 from er_gym.tasks.splits import is_about, split_of
 from er_gym.tasks.task import type_of_id
 

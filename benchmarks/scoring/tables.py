@@ -1,10 +1,10 @@
-"""Reports as tables for people: on the terminal or in Markdown."""
+"""Reports as tables for people, and tables on the terminal."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from textwrap import fill
 
 from rich import box
@@ -12,40 +12,21 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from benchmarks.scoring.metrics import METRICS, Estimate, Score, Summary
-from benchmarks.scoring.report import BOTH, RunReport, by_group, by_type, sample_slices, slices
+from benchmarks.scoring.metrics import METRICS, Estimate, Score
+from benchmarks.scoring.report import BOTH, RunReport, by_group, sample_slices, slices
 from benchmarks.scoring.samples import most_samples
 from benchmarks.terminal import plain
 from er_gym.envs.protocol import DEFAULT
+from er_gym.tables import Table
 from er_gym.tasks.types import BY_NAME, GROUPS
 
-_NONE = "-"
+NONE = "-"
+"""A cell without a figure."""
 _MOST_IN_FULL = 4
 """Of more runs and scorers at once, each has no table of its own."""
 _WORDS_WIDTH = 18
 """Columns of words are not folded to less than this many characters."""
 _GAP = 2
-
-
-@dataclass(frozen=True)
-class Table:
-    """Cells as they are shown.
-
-    Attributes:
-        title: above the table.
-        head: column names.
-        rows: as wide as ``head``; where there are none, only the title is shown.
-        text_columns: how many columns, from the left, hold words; the rest are figures.
-        notes: lines below it.
-        may_turn: whether the table may be transposed on a narrow terminal.
-    """
-
-    title: str
-    head: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    text_columns: int
-    notes: tuple[str, ...] = ()
-    may_turn: bool = False
 
 
 def tables(
@@ -129,7 +110,7 @@ def _overview_row(run: RunReport, scorer: str, scores: Sequence[Score]) -> tuple
         n = f"{len(scores)} of {n}"
     head = (run.manifest.agent, run.manifest.suite, run.manifest.protocol, scorer, n)
     if not scores:
-        return (*head, *[_NONE] * (4 + len(GROUPS)))
+        return (*head, *[NONE] * (4 + len(GROUPS)))
     groups = by_group(scores)
     overall = slices(scores)[0][2]
     return (
@@ -138,7 +119,7 @@ def _overview_row(run: RunReport, scorer: str, scores: Sequence[Score]) -> tuple
         interval(overall["success"]),
         percent(overall["search_efficiency"].mean),
         percent(overall["completeness"].mean),
-        *(percent(groups[name]["success"].mean) if name in groups else _NONE for name in GROUPS),
+        *(percent(groups[name]["success"].mean) if name in groups else NONE for name in GROUPS),
     )
 
 
@@ -166,7 +147,7 @@ def _metrics(run: RunReport, scorer: str, scores: Sequence[Score]) -> Table:
 def _samples(run: RunReport, scorer: str, scores: Sequence[Score], with_types: bool) -> Table:
     """Success by task, where tasks were played several times."""
     lines = [
-        (BY_NAME[name].title if level == "type" else "All" if level == "overall" else name, counted)
+        (_name_of(level, name), counted)
         for level, name, counted in sample_slices(scores)
         if with_types or level != "type"
     ]
@@ -189,6 +170,11 @@ def _samples(run: RunReport, scorer: str, scores: Sequence[Score], with_types: b
         notes=(f"{rest} of {number} tasks have fewer samples and are not counted here",)
         * (rest > 0),
     )
+
+
+def _name_of(level: str, name: str) -> str:
+    """What tables call a slice."""
+    return "All" if level == "overall" else BY_NAME[name].title if level == "type" else name
 
 
 def _notes(run: RunReport) -> list[str]:
@@ -214,11 +200,7 @@ def _notes(run: RunReport) -> list[str]:
 
 
 def _types(run: RunReport, scorer: str, scores: Sequence[Score]) -> Table:
-    lines: Iterable[tuple[str, Summary]] = (
-        ("All", slices(scores)[0][2]),
-        *by_group(scores).items(),
-        *((BY_NAME[name].title, summary) for name, summary in by_type(scores).items()),
-    )
+    lines = [(_name_of(level, name), summary) for level, name, summary in slices(scores)]
     rows = [
         (
             name,
@@ -247,8 +229,8 @@ def _misses(run: RunReport) -> Table:
             miss.task_type,
             miss.scene,
             miss.end_reason,
-            miss.feedback or _NONE,
-            ", ".join(miss.missing) or _NONE,
+            miss.feedback or NONE,
+            ", ".join(miss.missing) or NONE,
         )
         for miss in run.misses
     ]
@@ -268,35 +250,15 @@ def percent(rate: float, digits: int = 2) -> str:
 def interval(estimate: Estimate) -> str:
     """The 95 % interval of a rate in %, ``-`` if it has none."""
     if estimate.low is None or estimate.high is None:
-        return _NONE
+        return NONE
     return f"{100 * estimate.low:.1f} to {100 * estimate.high:.1f}"
 
 
 def signed(estimate: Estimate | None) -> tuple[str, str]:
     """A difference in % and its interval; ``-`` for None."""
     if estimate is None:
-        return _NONE, _NONE
+        return NONE, NONE
     return f"{100 * estimate.mean:+.1f}", interval(estimate)
-
-
-def as_markdown(found: Sequence[Table]) -> str:
-    """The tables in GitHub's Markdown."""
-    return "\n".join(_markdown(table) for table in found)
-
-
-def _markdown(table: Table) -> str:
-    rules = ["---" if column < table.text_columns else "---:" for column in range(len(table.head))]
-    lines = [
-        "| " + " | ".join(" ".join(cell.split()).replace("|", "\\|") for cell in row) + " |"
-        for row in (table.head, tuple(rules), *table.rows)
-    ]
-    notes = [f"\n{' '.join(note.split())}" for note in table.notes]
-    return (
-        "\n".join(
-            [f"**{' '.join(table.title.split())}**\n", *(lines if table.rows else ()), *notes]
-        )
-        + "\n"
-    )
 
 
 def print_tables(found: Sequence[Table], console: Console) -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from benchmarks.scoring.tables import Table, print_tables
+from benchmarks.scoring.tables import print_tables
 from benchmarks.terminal import stdout
+from er_gym.tables import Table
 from er_gym.tasks.room_kinds import ROOM_KINDS, room_kind
 from er_gym.tasks.splits import split
 from er_gym.tasks.task import Task

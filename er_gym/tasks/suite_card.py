@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import fill
 
+from er_gym.tables import Table
 from er_gym.tasks import jsonl_format, verbs
 from er_gym.tasks.difficulty import hidden_depth, length
 from er_gym.tasks.room_kinds import ROOM_KINDS, room_kind
@@ -207,16 +208,7 @@ def _across(title: str, counts: Mapping[str, int] | Mapping[int, int]) -> str:
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]], figures: int = 0) -> str:
     """A Markdown table whose last ``figures`` columns hold numbers; "" without rows."""
-    if not rows:
-        return ""
-    words = len(head) - figures
-    rules = ["---"] * words + ["---:"] * figures
-    cells = [head, rules, *([_cell(cell) for cell in row] for row in rows)]
-    return "\n".join(f"| {' | '.join(row)} |" for row in cells)
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|").replace("\n", " ")
+    return Table("", tuple(head), tuple(map(tuple, rows)), len(head) - figures).markdown()
 
 
 def _value(value: object) -> str:

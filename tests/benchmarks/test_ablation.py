@@ -13,10 +13,9 @@ from click.testing import CliRunner
 
 from agents.finetune.drawing import drawn
 from agents.finetune.settings import load_settings
-from benchmarks.ablation.phases import plan_of
-from benchmarks.ablation.settings import ablation_names, load_ablation
 from benchmarks.cli.main import cli
 from benchmarks.pages.models import main as models_page
+from benchmarks.study.kinds import ABLATION, Study
 
 for package in ("torch", "transformers", "peft", "tensorboard"):
     pytest.importorskip(package, reason="needs the extra finetune")
@@ -43,10 +42,10 @@ SMALL: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("name", ablation_names())
+@pytest.mark.parametrize("name", ABLATION.names())
 def test_the_phases_are_commands_that_exist(name: str, tmp_path: Path) -> None:
-    settings = load_ablation(name)
-    plan = plan_of(settings, tmp_path).phases
+    settings = ABLATION.load(name)
+    plan = Study(ABLATION, tmp_path, settings).plan.phases
     assert len({phase.name for phase in plan}) == len(plan)
     for phase in plan:
         for option, value in pairwise(phase.command):

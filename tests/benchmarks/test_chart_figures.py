@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from support import make_task
 
-from benchmarks.scoring import charts, data_charts
+from benchmarks.scoring import charts, data_charts, drawing
 from er_gym.data.paper_figures import THOUGHTS, TRANSITIONS
 from er_gym.data.statistics import STATES, PartStatistics, Statistics
 from er_gym.data.trajectory import THOUGHT_KINDS
@@ -37,8 +37,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., dict
     def keep(path: Path, figure: Any, **_: Any) -> None:
         found[path.stem] = figure
 
-    for module in (charts, data_charts):
-        monkeypatch.setattr(module, "write_chart", keep)
+    monkeypatch.setattr(drawing, "write_figure", keep)
 
     def run(draw: Callable[..., Any], *arguments: Any) -> dict[str, Any]:
         found.clear()
@@ -124,9 +123,9 @@ def test_every_type_and_kind_of_room_has_its_number(drawn: Callable[..., dict[st
         (1.5, 1.5): "3",
     }
     assert {at: each.get_color() for at, each in cells.items()} == {
-        (0.5, 0.5): charts.INK,
+        (0.5, 0.5): drawing.INK,
         (1.5, 0.5): "white",  # on a dark ground
-        (0.5, 1.5): charts.MUTED,
+        (0.5, 1.5): drawing.MUTED,
         (1.5, 1.5): "white",
     }
     assert [each.split("\n") for each in labels(figure, "x")] == [
@@ -160,7 +159,7 @@ def test_what_follows_what_beside_the_papers_shares(drawn: Callable[..., dict[st
             assert (below and below.get_text()) == (f"({theirs})" if ours or theirs else None)
     place = columns.index("action") + 0.5
     assert at[place, 0.4].get_color() == "white"
-    assert at[columns.index("analysis") + 0.5, 0.4].get_color() == data_charts.INK
+    assert at[columns.index("analysis") + 0.5, 0.4].get_color() == drawing.INK
     assert labels(figure, "x") == list(columns)
     assert labels(figure, "y") == list(STATES)
 
@@ -173,16 +172,19 @@ def test_kinds_of_thoughts_beside_the_papers(drawn: Callable[..., dict[str, Any]
     figure = drawn(data_charts.draw_statistics, STATISTICS)["kinds"]
     assert figure.get_suptitle() == "ours: thoughts by kind, in %, n = 4"
     widths = [bar.get_width() for bar in figure.axes[0].patches]
+    number = len(THOUGHT_KINDS)
     ours = [{"planning": 75, "reflection": 25}.get(kind, 0) for kind in THOUGHT_KINDS]
-    assert widths[::2] == ours
+    assert widths[:number] == ours
     theirs = [100 * THOUGHTS[kind] / sum(THOUGHTS.values()) for kind in THOUGHT_KINDS]
-    assert widths[1::2] == pytest.approx(theirs)
+    assert widths[number:] == pytest.approx(theirs)
     assert texts(figure) == [f"{width:.1f}" for width in widths]
     assert legend(figure) == ["this collection", "the paper"]
     heights = [bar.get_y() + bar.get_height() / 2 for bar in figure.axes[0].patches]
-    assert heights[:2] == pytest.approx([-0.2, 0.2])  # ours above the paper's, as y grows downwards
+    assert heights[::number] == pytest.approx(
+        [-0.2, 0.2]
+    )  # ours above the paper's, as y grows downwards
     none = drawn(data_charts.draw_statistics, Statistics(parts=STATISTICS.parts))["kinds"]
-    assert [bar.get_width() for bar in none.axes[0].patches][::2] == [0] * len(THOUGHT_KINDS)
+    assert [bar.get_width() for bar in none.axes[0].patches][:number] == [0] * len(THOUGHT_KINDS)
 
 
 def test_lengths_of_trajectories_by_part(drawn: Callable[..., dict[str, Any]]) -> None:

@@ -83,7 +83,7 @@ def draw(out):
     curves.draw_curves({"one": [Run()]}, out)
     with drawing.own_style():
         figure, _ = drawing.canvas(3, 2, "alone")
-    drawing.write_chart(out / "alone.png", figure, force=False)
+    drawing.write_charts(out, {"alone": figure}, force=False)
 if __name__ == "__main__":
     draw(Path(sys.argv[1]))
     assert "matplotlib.pyplot" not in sys.modules

@@ -20,11 +20,11 @@ from click.testing import CliRunner
 
 from agents.finetune.settings import load_settings
 from benchmarks.cli.main import cli, main
-from benchmarks.ladder.phases import plan_of, rungs
-from benchmarks.ladder.settings import ladder_names, load_ladder
 from benchmarks.pages.models import main as models_page
-from benchmarks.plan.phase import Phase
-from benchmarks.plan.run import PhaseFailed, Plan, PlanRecord, run_plan
+from benchmarks.study.kinds import LADDER, Study
+from benchmarks.study.ladder_phases import rungs
+from benchmarks.study.phase import Phase
+from benchmarks.study.run import PhaseFailed, Plan, PlanRecord, run_plan
 
 for package in ("torch", "transformers", "peft", "tensorboard"):
     pytest.importorskip(package, reason="needs the extra finetune")
@@ -71,10 +71,10 @@ def parsed(phase: Phase) -> None:
     command.make_context(name, [*arguments])
 
 
-@pytest.mark.parametrize("name", ladder_names())
+@pytest.mark.parametrize("name", LADDER.names())
 def test_the_phases_are_commands_that_exist(name: str, tmp_path: Path) -> None:
-    settings = load_ladder(name)
-    plan = plan_of(settings, tmp_path).phases
+    settings = LADDER.load(name)
+    plan = Study(LADDER, tmp_path, settings).plan.phases
     names = [phase.name for phase in plan]
     assert len(set(names)) == len(names)
     for phase in plan:
@@ -82,14 +82,17 @@ def test_the_phases_are_commands_that_exist(name: str, tmp_path: Path) -> None:
             if name_of in ("--data", "--correct", "--select"):
                 Path(value).mkdir(parents=True, exist_ok=True)
         parsed(phase)
-    assert {rung.run for rung in rungs(settings)} <= {phase.out for phase in plan}
+    assert {run for rung in rungs(settings) for run in rung.runs.values()} <= {
+        phase.out for phase in plan
+    }
     for row in settings.stages.values():
         load_settings(row.finetune, row.set)
 
 
 def test_each_stage_learns_from_the_model_before(tmp_path: Path) -> None:
     plan = {
-        phase.name: phase.command for phase in plan_of(load_ladder("tiny-text"), tmp_path).phases
+        phase.name: phase.command
+        for phase in Study(LADDER, tmp_path, LADDER.load("tiny-text")).plan.phases
     }
     first, second, third = (
         plan[f"{stage}/finetune"] for stage in ("1-imitation", "2-exploration", "3-reflection")
@@ -105,8 +108,8 @@ def test_each_stage_learns_from_the_model_before(tmp_path: Path) -> None:
 
 
 def test_failures_of_earlier_stages_are_corrected_too(tmp_path: Path) -> None:
-    settings = load_ladder("tiny-text", ["stages.reflection.sample.earlier=true"])
-    plan = {phase.name: phase.command for phase in plan_of(settings, tmp_path).phases}
+    settings = LADDER.load("tiny-text", ["stages.reflection.sample.earlier=true"])
+    plan = {phase.name: phase.command for phase in Study(LADDER, tmp_path, settings).plan.phases}
     earlier = plan["3-reflection/correct-2-exploration"]
     assert option(earlier, "--correct") == [str(tmp_path / "samples" / "2-exploration")]
     assert option(earlier, "--out")[0] in option(plan["3-reflection/finetune"], "--data")
@@ -115,8 +118,8 @@ def test_failures_of_earlier_stages_are_corrected_too(tmp_path: Path) -> None:
 def test_the_third_stage_learns_from_faults_and_from_what_is_new_to_the_model(
     tmp_path: Path,
 ) -> None:
-    settings = load_ladder("er-tiny-text", ["stages.reflection.teacher.faults=0.2"])
-    plan = {phase.name: phase.command for phase in plan_of(settings, tmp_path).phases}
+    settings = LADDER.load("er-tiny-text", ["stages.reflection.teacher.faults=0.2"])
+    plan = {phase.name: phase.command for phase in Study(LADDER, tmp_path, settings).plan.phases}
     assert option(plan["3-reflection/teacher"], "--faults") == ["0.2"]
     assert option(plan["3-reflection/sample"], "--faults") == ["0.1"]
     assert "--keep-failed" in plan["3-reflection/taught"]
@@ -137,7 +140,8 @@ def test_eyes_are_taught_before_the_first_stage_and_the_blind_copy_plays_last(
     tmp_path: Path,
 ) -> None:
     plan = {
-        phase.name: phase.command for phase in plan_of(load_ladder("er-tiny-vl"), tmp_path).phases
+        phase.name: phase.command
+        for phase in Study(LADDER, tmp_path, LADDER.load("er-tiny-vl")).plan.phases
     }
     frames = str(tmp_path / "data" / "frames")
     made, eyes, first = (
@@ -321,8 +325,8 @@ def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
     assert killed_in == sorted(set(killed_in))
     result = CliRunner().invoke(cli, command[3:])
     assert result.exit_code == 0, result.output
-    settings = load_ladder(str(file))
-    assert done(root) == [phase.name for phase in plan_of(settings, root).phases]
+    settings = LADDER.load(str(file))
+    assert done(root) == [phase.name for phase in Study(LADDER, root, settings).plan.phases]
     figures = json.loads((root / "result.json").read_text())
     assert [rung["name"] for rung in figures["rungs"]] == [*settings.stages]
     assert figures["rungs"][0]["gain"] is None
@@ -338,7 +342,8 @@ def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
     assert all(f"| {name} |" in written for name in done(root))
     assert written.count("](images/") == len([*page.parent.glob("images/*.png")]) >= 2
     before = [each.stat().st_mtime_ns for each in sorted(root.rglob("*.safetensors"))]
-    run_plan(plan_of(settings, root), root, main, lambda *phase: pytest.fail(f"{phase} runs again"))
+    plan = Study(LADDER, root, settings).plan
+    run_plan(plan, root, main, lambda *phase: pytest.fail(f"{phase} runs again"))
     assert before == [each.stat().st_mtime_ns for each in sorted(root.rglob("*.safetensors"))]
     other = ["ladder", "--config", str(file), "--set", "seed=3", "--out", str(root)]
     told = CliRunner().invoke(cli, other)
@@ -348,7 +353,7 @@ def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
 
 def test_the_time_of_a_phase_is_that_of_all_its_tries(tmp_path: Path) -> None:
     refused = Phase("suites", ("suites", "--nothing"), "suites")
-    plan = Plan("ladder", load_ladder("tiny-text"), (refused,))
+    plan = Plan("ladder", LADDER.load("tiny-text"), (refused,))
     seconds = []
     for _ in range(2):
         with pytest.raises(PhaseFailed):

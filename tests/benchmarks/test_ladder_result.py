@@ -11,11 +11,13 @@ import pytest
 from click.testing import CliRunner
 
 from benchmarks.cli.main import cli
-from benchmarks.ladder.phases import plan_of, rungs
-from benchmarks.ladder.result import RungResult, read_results, result_tables
-from benchmarks.ladder.settings import LadderSettings, load_ladder
 from benchmarks.scoring.report import load_run
 from benchmarks.scoring.scorers import CORRECTED
+from benchmarks.study.kinds import LADDER, Study
+from benchmarks.study.ladder import ladder_tables
+from benchmarks.study.ladder_phases import rungs
+from benchmarks.study.ladder_settings import LadderSettings
+from benchmarks.study.results import Result
 
 RATE = 0.3
 PLAYERS = {"imitation": "random", "exploration": "searcher", "reflection": "oracle"}
@@ -24,7 +26,7 @@ PLAYERS = {"imitation": "random", "exploration": "searcher", "reflection": "orac
 
 @pytest.fixture(scope="module")
 def settings() -> LadderSettings:
-    return load_ladder("tiny-text", [f"evaluation.faults=[{RATE}]", "evaluation.fault_samples=3"])
+    return LADDER.load("tiny-text", [f"evaluation.faults=[{RATE}]", "evaluation.fault_samples=3"])
 
 
 @pytest.fixture(scope="module")
@@ -34,10 +36,11 @@ def root(settings: LadderSettings, tmp_path_factory: pytest.TempPathFactory) -> 
     for rung in rungs(settings):
         if rung.name not in PLAYERS:
             continue
+        (run,) = rung.runs.values()
         command = ["bench", "--suite", "mini", "--limit", "11", "--spread"]
         # In explore the next cabinet is another object, so that repeats and revisits differ.
         command += ["--instances", "explore"]
-        command += ["--agent", PLAYERS[rung.name], "--out", str(root / rung.run)]
+        command += ["--agent", PLAYERS[rung.name], "--out", str(root / run)]
         if rung.faults:
             command += ["--faults", str(RATE), "--samples", str(settings.evaluation.fault_samples)]
         played = CliRunner().invoke(cli, command)
@@ -46,12 +49,14 @@ def root(settings: LadderSettings, tmp_path_factory: pytest.TempPathFactory) -> 
 
 
 @pytest.fixture(scope="module")
-def results(settings: LadderSettings, root: Path) -> dict[tuple[str, float], RungResult]:
-    return {(each.rung.name, each.rung.faults): each for each in read_results(settings, root)}
+def results(settings: LadderSettings, root: Path) -> dict[tuple[str, float], Result]:
+    ((_, found),) = Study(LADDER, root, settings).results()
+    return {(each.name, each.of.faults): each for each in found}
 
 
-def by_task(root: Path, result: RungResult, metric: str) -> Mapping[str, float]:
-    scores = load_run(root / result.rung.run).scores[CORRECTED.name]
+def by_task(root: Path, result: Result, metric: str) -> Mapping[str, float]:
+    (run,) = result.of.runs.values()
+    scores = load_run(root / run).scores[CORRECTED.name]
     tasks = {each.task_id for each in scores}
     return {
         task: mean(float(getattr(each, metric)) for each in scores if each.task_id == task)
@@ -60,14 +65,14 @@ def by_task(root: Path, result: RungResult, metric: str) -> Mapping[str, float]:
 
 
 def test_only_faults_are_played_several_times(settings: LadderSettings, tmp_path: Path) -> None:
-    plan = {phase.name: phase.command for phase in plan_of(settings, tmp_path).phases}
+    plan = {phase.name: phase.command for phase in Study(LADDER, tmp_path, settings).plan.phases}
     assert "--samples" not in plan["evaluations/3-reflection"]
     faulty = plan[f"evaluations/3-reflection-faults-{RATE}"]
     assert ("--samples", "3") in [*pairwise(faulty)]
 
 
 def test_what_faults_cost_is_paired_over_tasks(
-    root: Path, results: Mapping[tuple[str, float], RungResult]
+    root: Path, results: Mapping[tuple[str, float], Result]
 ) -> None:
     losses = {}
     for name in ("exploration", "reflection"):
@@ -75,33 +80,33 @@ def test_what_faults_cost_is_paired_over_tasks(
         assert faulty.summary.n == 33
         before, after = by_task(root, without, "success"), by_task(root, faulty, "success")
         losses[name] = mean(after[task] - before[task] for task in before)
-        assert faulty.change is not None
-        assert faulty.change.mean == pytest.approx(losses[name])
-    assert results["exploration", RATE].spared is None
-    spared = results["reflection", RATE].spared
+        assert faulty.differences["change"] is not None
+        assert faulty.differences["change"].mean == pytest.approx(losses[name])
+    assert results["exploration", RATE].differences["spared"] is None
+    spared = results["reflection", RATE].differences["spared"]
     assert spared is not None
     assert spared.mean == pytest.approx(losses["reflection"] - losses["exploration"])
     assert spared.low < spared.mean < spared.high
-    (table,) = (each for each in result_tables([*results.values()]) if "faults" in each.title)
+    (table,) = (each for each in ladder_tables([*results.values()]) if "faults" in each.title)
     assert [row[0] for row in table.rows] == ["exploration", "reflection"]
 
 
 def test_repeated_exploration_is_compared_with_the_first_stage(
-    root: Path, results: Mapping[tuple[str, float], RungResult]
+    root: Path, results: Mapping[tuple[str, float], Result]
 ) -> None:
     for name in ("exploration", "reflection"):
         told = results[name, 0.0]
         for metric, more in (
-            ("repeat_rate", told.more_repeats),
-            ("revisit_rate", told.more_revisits),
+            ("repeat_rate", told.differences["more_repeats"]),
+            ("revisit_rate", told.differences["more_revisits"]),
         ):
             first = by_task(root, results["imitation", 0.0], metric)
             now = by_task(root, told, metric)
             assert more is not None
             assert more.mean == pytest.approx(mean(now[t] - first[t] for t in first))
-    assert results["imitation", 0.0].more_repeats is None
-    assert results["exploration", RATE].more_repeats is None
-    (table,) = (each for each in result_tables([*results.values()]) if "Repeated" in each.title)
+    assert results["imitation", 0.0].differences["more_repeats"] is None
+    assert results["exploration", RATE].differences["more_repeats"] is None
+    (table,) = (each for each in ladder_tables([*results.values()]) if "Repeated" in each.title)
     assert [row[:2] for row in table.rows] == [
         ("exploration", "0"),
         ("reflection", "0"),

@@ -11,9 +11,10 @@ from benchmarks.cli import options as cli_options
 from benchmarks.scoring import report
 from benchmarks.scoring.metrics import METRICS, summarise
 from benchmarks.scoring.report import load_run
-from benchmarks.scoring.tables import as_markdown, print_tables, tables
+from benchmarks.scoring.tables import print_tables, tables
 from er_gym.envs.protocol import PROTOCOLS
 from er_gym.rollout.run_directory import RunDirectory
+from er_gym.tables import as_markdown
 
 KEYS = ("navigate to CounterTop", "pickup Egg", "navigate to Bowl", "put in Bowl", "end")
 UNTYPED = ("pickup Egg", "put in = Plate|-01.47|+01.31|+00.24", "end")

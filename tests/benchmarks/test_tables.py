@@ -14,9 +14,10 @@ from benchmarks.scoring import task_counts
 from benchmarks.scoring.data_tables import statistics_tables
 from benchmarks.scoring.metrics import Estimate
 from benchmarks.scoring.report import load_run
-from benchmarks.scoring.tables import Table, interval, print_tables, signed, tables
+from benchmarks.scoring.tables import interval, print_tables, signed, tables
 from er_gym.data.paper_figures import SETS, THOUGHTS
 from er_gym.data.statistics import PartStatistics, Statistics
+from er_gym.tables import Table, as_markdown
 
 TABLE = Table(
     "Results, in %",
@@ -84,7 +85,18 @@ def test_a_table_turns_where_only_then_it_fits() -> None:
 
 
 def test_a_table_without_rows_is_its_title_and_notes() -> None:
-    assert shown(Table("None", ("a",), (), 1, notes=("why",)), 40) == "\nNone\nwhy\n"
+    table = Table("None", ("a",), (), 1, notes=("why",))
+    assert shown(table, 40) == "\nNone\nwhy\n"
+    assert as_markdown([table]) == "**None**\n\n\nwhy\n"
+    assert (table.markdown(), table.csv()) == ("", "a\n")
+
+
+def test_a_table_in_markdown_and_as_csv() -> None:
+    table = Table("T\nU", ("name", "n"), (("a|b\nc", "1"), ('d, "e"', "")), 1, notes=("x: y",))
+    cells = '| name | n |\n| --- | ---: |\n| a\\|b c | 1 |\n| d, "e" |  |'
+    assert table.markdown() == cells
+    assert as_markdown([table, table]) == "\n".join([f"**T U**\n\n{cells}\n\nx: y\n"] * 2)
+    assert table.csv() == 'name,n\n"a|b\nc",1\n"d, ""e""",\n'
 
 
 @in_one_test(

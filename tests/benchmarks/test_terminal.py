@@ -13,8 +13,9 @@ from benchmarks.checks import terminals
 from benchmarks.checks.bad_files import HOSTILE
 from benchmarks.cli import main as cli
 from benchmarks.cli.progress import Progress
-from benchmarks.scoring.tables import Table, print_tables
+from benchmarks.scoring.tables import print_tables
 from benchmarks.terminal import plain, terminal
+from er_gym.tables import Table
 
 
 def test_terminal_control_characters_are_shown_as_escapes():

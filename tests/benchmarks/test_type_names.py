@@ -9,8 +9,8 @@ import pytest
 from agents.expert.recipe import Part
 from agents.rl.config import EnvConfig, Phase
 from benchmarks.cli.suites import chosen_tasks
-from benchmarks.ladder.settings import LadderSettings
-from benchmarks.plan.checks import check_tasks
+from benchmarks.study.checks import check_tasks
+from benchmarks.study.ladder_settings import LadderSettings
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.selection import select
 from er_gym.tasks import TASK_TYPES, load_suite

@@ -9,18 +9,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from benchmarks.monitor.charts import (
-    MOST_POINTS,
-    Axis,
-    Point,
-    Series,
-    chart,
-    decimated,
-    points,
-    round_ticks,
-    tick_label,
-)
+from benchmarks.monitor.charts import as_svg, round_ticks, tick_label
 from benchmarks.monitor.curve_tail import CurveTail, last_line
+from benchmarks.scoring.series import MOST_POINTS, Axis, Chart, Point, Series, decimated, points
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -58,7 +49,8 @@ def test_a_chart_is_to_scale_and_says_what_it_shows():
         Series("while <it> trains", points([(0, 0), (100, 50), (200, 100)])),
         Series("evaluation", [Point(100, 40, 30, 60)], whiskers=True),
     ]
-    markup = chart("x", "Success & more", Axis("steps"), Axis("%", 0, 100), lines)
+    chart = Chart("Success & more", Axis("steps"), Axis("%", 0, 100), lines)
+    markup = as_svg("x", chart)
     picture = drawn(markup)
     assert picture.get("role") == "img"
     assert picture.get("aria-labelledby") == "x-title x-desc"
@@ -75,16 +67,17 @@ def test_a_chart_is_to_scale_and_says_what_it_shows():
     assert {"s0", "s1"} <= looks
     shapes = {each.get("d") for each in picture.iter(f"{SVG}path") if each.get("class") == "marker"}
     assert len(shapes) == 2
-    assert chart("x", "Success & more", Axis("steps"), Axis("%", 0, 100), lines) == markup
+    assert as_svg("x", chart) == markup
 
 
 def test_what_cannot_be_drawn_is_left_out():
     odd = points([(0, 1), (1, float("nan")), (2, float("inf")), (3, 0.0), (4, 10.0)])
-    picture = drawn(chart("x", "", Axis(), Axis(log=True), [Series("a", odd)]))
+    picture = drawn(as_svg("x", Chart("", Axis(), Axis(log=True), [Series("a", odd)])))
     (line,) = picture.iter(f"{SVG}polyline")
     assert len(places(line)) == 2
-    assert chart("x", "", Axis(), Axis(), [Series("a", [])]) == ""
-    assert "polyline" not in chart("x", "", Axis(), Axis(), [Series("a", points([(5, 3)]))])
+    assert as_svg("x", Chart("", Axis(), Axis(), [Series("a", [])])) == ""
+    one = Chart("", Axis(), Axis(), [Series("a", points([(5, 3)]))])
+    assert "polyline" not in as_svg("x", one)
 
 
 def test_long_series_keep_their_range():

@@ -14,13 +14,10 @@ from typing import Any
 from fastapi.testclient import TestClient
 from filelock import lock_descriptor
 
-from benchmarks.ablation.phases import plan_of as plan_of_ablation
-from benchmarks.ablation.settings import ablation_names, load_ablation
-from benchmarks.ladder.phases import plan_of as plan_of_ladder
-from benchmarks.ladder.settings import load_ladder
 from benchmarks.monitor.growth import growth, in_use
 from benchmarks.monitor.places import Places
-from benchmarks.plan.run import DonePhase, Plan, PlanRecord
+from benchmarks.study.kinds import ABLATION, LADDER, Study
+from benchmarks.study.run import DonePhase, Plan, PlanRecord
 from er_gym import __version__
 from er_gym.locking import LOCK, exclusive_use
 
@@ -118,8 +115,8 @@ def test_a_policy_shows_training_and_evaluation(tmp_path, visit):
 def test_a_ladder_shows_its_phases_and_the_success_of_each_rung(tmp_path, visit, runs):
     root = tmp_path / "ladder"
     root.mkdir()
-    settings = load_ladder("tiny-text")
-    plan = plan_of_ladder(settings, root)
+    settings = LADDER.load("tiny-text")
+    plan = Study(LADDER, root, settings).plan
     names = [phase.name for phase in plan.phases]
     measured = names.index("evaluations/1-imitation")
     shutil.copytree(runs / "random", root / "evaluations" / "0-base")
@@ -148,8 +145,8 @@ def test_a_ladder_shows_its_phases_and_the_success_of_each_rung(tmp_path, visit,
 def test_an_ablation_shows_its_studies(tmp_path, visit, runs):
     root = tmp_path / "ablation"
     root.mkdir()
-    settings = load_ablation(ablation_names()[0])
-    make_plan(plan_of_ablation(settings, root), root, 1)
+    settings = ABLATION.load(ABLATION.names()[0])
+    make_plan(Study(ABLATION, root, settings).plan, root, 1)
     study = next(iter(settings.studies.values()))
     for name, run in zip(study.rows, ("oracle", "random"), strict=False):
         shutil.copytree(runs / run, root / "evaluations" / name / str(settings.seeds[0]))

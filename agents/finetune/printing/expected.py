@@ -8,6 +8,7 @@ from agents.finetune.memory import GIB, Memory, ModelNumbers, Plan, memory
 from agents.finetune.models import load_facts, model_names
 from agents.finetune.printing.plan import PrintPlan
 from agents.finetune.settings import FinetuneSettings, Lora
+from er_gym.tables import Table
 
 _PATCHES_A_TOKEN = 4
 _TRAINED = 16
@@ -59,18 +60,15 @@ def expected(
     )
 
 
-def run_table(plan: PrintPlan, *, whole_embeddings: bool) -> list[str]:
-    """A Markdown table of this run: at its longest conversation, and at the most it may have."""
+def run_table(plan: PrintPlan, *, whole_embeddings: bool) -> Table:
+    """A table of this run: at its longest conversation, and at the most it may have."""
     facts, limit = plan.facts, plan.settings.data.max_length
     share = facts.picture_tokens / max(1, facts.tokens)
     rows = [
         (f"longest conversation here, about {facts.tokens:,} tokens", facts.tokens),
         (f"`data.max_length`, {limit:,} tokens", limit),
     ]
-    lines = [
-        f"| GiB on each GPU | {' | '.join(PARTS)} | sum |",
-        "| --- |" + " ---: |" * (len(PARTS) + 1),
-    ]
+    lines = []
     for told, tokens in rows:
         found = expected(
             plan.model.facts.numbers,
@@ -80,20 +78,17 @@ def run_table(plan: PrintPlan, *, whole_embeddings: bool) -> list[str]:
             gpus=plan.gpus,
             new_tokens=facts.feedback and whole_embeddings,
         )
-        cells = " | ".join(_gib(getattr(found, part)) for part in PARTS)
-        lines.append(f"| {told} | {cells} | **{_gib(found.total)}** |")
-    return lines
+        cells = (_gib(getattr(found, part)) for part in PARTS)
+        lines.append((told, *cells, f"**{_gib(found.total)}**"))
+    return Table("", ("GiB on each GPU", *PARTS, "sum"), tuple(lines), 1)
 
 
-def models_table(plan: PrintPlan) -> list[str]:
-    """A Markdown table of all models that er-gym knows, full and LoRA, at this run's length."""
+def models_table(plan: PrintPlan) -> Table:
+    """A table of all models that er-gym knows, full and LoRA, at this run's length."""
     facts, settings = plan.facts, plan.settings
     lora = settings.model.lora or Lora()
     counts = (1, 2, 4, 8)
-    lines = [
-        "| model | " + " | ".join(f"full, {n} GPU{'s' * (n > 1)}" for n in counts) + " | LoRA |",
-        "| --- |" + " ---: |" * (len(counts) + 1),
-    ]
+    lines = []
     for name in model_names():
         numbers = load_facts(name).numbers
         cells = []
@@ -107,8 +102,9 @@ def models_table(plan: PrintPlan) -> list[str]:
                 gpus=gpus,
             )
             cells.append(_gib(found.total))
-        lines.append(f"| {name} | {' | '.join(cells)} |")
-    return lines
+        lines.append((name, *cells))
+    full = (f"full, {n} GPU{'s' * (n > 1)}" for n in counts)
+    return Table("", ("model", *full, "LoRA"), tuple(lines), 1)
 
 
 def _gib(count: int) -> str:

@@ -49,11 +49,11 @@ def readme(plan: PrintPlan, printed: Printed, program: str) -> str:
         f"{facts.shown} pictures; its text is counted by rule, for want of a tokenizer. These "
         "programs compute scores for every token at once, which at great length is most of it.",
         "",
-        *run_table(plan, whole_embeddings=program in _WHOLE_EMBEDDINGS),
+        run_table(plan, whole_embeddings=program in _WHOLE_EMBEDDINGS).markdown(),
         "",
         "Other models at the length of the longest conversation, in GiB on each GPU (full "
         "fine-tuning on several with ZeRO-3):",
         "",
-        *models_table(plan),
+        models_table(plan).markdown(),
     ]
     return "\n".join(lines) + "\n"

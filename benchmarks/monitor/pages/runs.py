@@ -7,10 +7,10 @@ from typing import Any
 
 from fastapi import Request, Response
 
-from benchmarks.ladder.paper_rungs import PAPER
 from benchmarks.monitor.listing import page_of
 from benchmarks.monitor.run_view import Filter, RunView
 from benchmarks.monitor.site import Routes, Site
+from benchmarks.study.paper_rungs import PAPER
 from er_gym.tasks.types import COMPOSITE, MANIPULATE, SEARCH, TRANSPORT
 
 _COUNT_SECONDS = 0.1

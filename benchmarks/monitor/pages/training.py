@@ -61,18 +61,13 @@ class TrainingPages:
         return self._site.show(request, "trained.html", variables)
 
     def _show_plan(self, request: Request, place: Place) -> Response:
-        from benchmarks.monitor.plan_view import ladder_chart, ladder_rows, studies
+        from benchmarks.monitor.plan_view import part_views
 
         t = self._site.translator(request)
         inside = _Inside(self._site, place)
         plan, settings = self._plan(place)
-        variables: dict[str, Any] = {"rows": [], "chart": "", "studies": []}
-        if settings is not None and place.kind == "ladder":
-            rows = ladder_rows(settings, inside)
-            variables |= {"rows": rows, "chart": ladder_chart(rows, t)}
-        elif settings is not None:
-            variables["studies"] = studies(settings, inside, t)
-        variables |= {
+        variables = {
+            "compared": part_views(place.kind, settings, inside, t) if settings else [],
             "plan": plan,
             "groups": GROUPS,
             "live": ",".join([place.id, *(each.id for each in inside.places.values())][:100]),

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, field_validator, model_validator
 
-from agents import configs
 from agents.expert.corrections import CorrectAfter, CorrectBy
 from agents.finetune.settings import STAGES, Stage
-from benchmarks.plan.settings import Collected, PlaySettings, Positive, StrictSettings, Taught
-
-KIND = "ladder"
-_WHAT = "ladder"
-
+from benchmarks.study.settings import (
+    Collected,
+    Evaluation,
+    PlaySettings,
+    Positive,
+    StrictSettings,
+    Taught,
+)
 
 Control: TypeAlias = Literal["random", "blind"]
 """Who plays beside the ladder: actions at random, or the last model with noise for pictures."""
@@ -112,12 +113,10 @@ class StageSettings(StrictSettings):
     set: tuple[str, ...] = ()
 
 
-class Evaluation(StrictSettings):
+class LadderEvaluation(Evaluation):
     """How each rung is measured.
 
     Attributes:
-        suite: whose rooms the training did not see.
-        limit: how many tasks, spread over the suite; None for all.
         faults: fault rates of further evaluations, after the stages from the second on.
         fault_samples: how often each task is played with faults. Other actions go wrong each time,
             so more samples tell more exactly what faults cost.
@@ -126,8 +125,6 @@ class Evaluation(StrictSettings):
         set: overrides of the agent's settings.
     """
 
-    suite: str = "er-1k"
-    limit: Positive | None = None
     faults: tuple[Annotated[float, Field(gt=0, le=1)], ...] = ()
     fault_samples: Positive = 1
     base: bool = True
@@ -146,7 +143,7 @@ class LadderSettings(PlaySettings):
 
     base: Base
     stages: dict[Stage, StageSettings] = Field(min_length=1)
-    evaluation: Evaluation = Evaluation()
+    evaluation: LadderEvaluation = LadderEvaluation()
 
     @field_validator("stages")
     @classmethod
@@ -191,17 +188,3 @@ def _of_corrections(sample: Sampled) -> list[str]:
 def _rewrites_nothing(sample: Sampled) -> bool:
     """Whether the third stage would take no success whose thoughts could be written anew."""
     return sample.rewrite_thoughts and not sample.successes
-
-
-def ladder_names() -> tuple[str, ...]:
-    """The names of er-gym's own ladders, in alphabetical order."""
-    return configs.names(KIND)
-
-
-def load_ladder(name: str, overrides: Sequence[str] = ()) -> LadderSettings:
-    """Read a ladder from a file of ``configs/ladder`` by name, or from any file by path.
-
-    Raises:
-        ValueError: the file does not exist, or the file or an override is invalid.
-    """
-    return configs.load(LadderSettings, configs.file_of(KIND, name, _WHAT), _WHAT, overrides)

@@ -54,6 +54,18 @@ class Taught(StrictSettings):
     limit: Positive | None = None
 
 
+class Evaluation(StrictSettings):
+    """How each model is measured.
+
+    Attributes:
+        suite: whose rooms the training did not see.
+        limit: how many tasks, spread over the suite; None for all.
+    """
+
+    suite: str = "er-1k"
+    limit: Positive | None = None
+
+
 class PlaySettings(StrictSettings):
     """How trajectories are played and put into words, and how models play.
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from agents import configs
-from benchmarks.plan.settings import Collected, PlaySettings, Positive, StrictSettings, Taught
+from benchmarks.study.settings import Collected, Evaluation, PlaySettings, StrictSettings, Taught
 
-KIND = "ablations"
-_WHAT = "ablation"
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 +,.-]*$")]
 """Names of rows and the like are also names of directories."""
 
@@ -58,7 +54,7 @@ class Row(StrictSettings):
     dialect: str = ""
 
 
-class Study(StrictSettings):
+class Compared(StrictSettings):
     """Rows that are compared.
 
     Attributes:
@@ -74,24 +70,12 @@ class Study(StrictSettings):
     numbers: tuple[Annotated[float, Field(gt=0)], ...] = ()
 
     @model_validator(mode="after")
-    def _a_number_for_each_row(self) -> Study:
+    def _a_number_for_each_row(self) -> Compared:
         if self.numbers and len(self.numbers) != len(self.rows):
             raise ValueError(
                 f"{len(self.numbers)} numbers for {len(self.rows)} rows; give one each"
             )
         return self
-
-
-class Evaluation(StrictSettings):
-    """How each model is measured.
-
-    Attributes:
-        suite: whose rooms the training did not see.
-        limit: how many tasks, spread over the suite; None for all.
-    """
-
-    suite: str = "er-1k"
-    limit: Positive | None = None
 
 
 class AblationSettings(PlaySettings):
@@ -115,7 +99,7 @@ class AblationSettings(PlaySettings):
     seeds: tuple[Annotated[int, Field(ge=0, lt=2**32)], ...] = Field((0,), min_length=1)
     collections: dict[Name, Source] = Field(min_length=1)
     rows: dict[Name, Row] = Field(min_length=1)
-    studies: dict[Name, Study] = Field(min_length=1)
+    studies: dict[Name, Compared] = Field(min_length=1)
     evaluation: Evaluation = Evaluation()
 
     @model_validator(mode="after")
@@ -130,17 +114,3 @@ class AblationSettings(PlaySettings):
                 if name not in known:
                     raise ValueError(f"there is no {what} {name!r}; there are: {', '.join(known)}")
         return self
-
-
-def ablation_names() -> tuple[str, ...]:
-    """The names of er-gym's own ablations, in alphabetical order."""
-    return configs.names(KIND)
-
-
-def load_ablation(name: str, overrides: Sequence[str] = ()) -> AblationSettings:
-    """Read an ablation from a file of ``configs/ablations`` by name, or from any file by path.
-
-    Raises:
-        ValueError: the file does not exist, or the file or an override is invalid.
-    """
-    return configs.load(AblationSettings, configs.file_of(KIND, name, _WHAT), _WHAT, overrides)

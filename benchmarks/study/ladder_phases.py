@@ -4,55 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from agents.finetune.settings import STAGES, Stage
-from benchmarks.ladder.settings import CONTROLS, Control, LadderSettings, Sampled, StageSettings
-from benchmarks.plan.commands import Commands
-from benchmarks.plan.phase import Phase
-from benchmarks.plan.run import Plan
+from benchmarks.study.commands import Commands
+from benchmarks.study.ladder_settings import (
+    CONTROLS,
+    Control,
+    LadderSettings,
+    Sampled,
+    StageSettings,
+)
+from benchmarks.study.phase import Measurement, Phase
 
 BASE = "base"
 _NEW, _FRAMES = "new-model", "data/frames"
 
 
-@dataclass(frozen=True)
-class Rung:
-    """A model that is measured.
-
-    Attributes:
-        name: ``base``, the stage that made it, or a control.
-        faults: the rate of faults.
-        run: the run directory of its evaluation, relative to the ladder's.
-    """
-
-    name: str
-    faults: float
-    run: str
+def ladder_phases(settings: LadderSettings, make: Commands) -> Iterator[Phase]:
+    """All phases of a ladder in order."""
+    return _Ladder(settings, make).phases()
 
 
-def plan_of(settings: LadderSettings, root: Path) -> Plan:
-    """All phases of a ladder in order.
-
-    Args:
-        settings: of the ladder.
-        root: its directory.
-    """
-    return Plan("ladder", settings, tuple(_Ladder(settings, Commands(settings, root)).phases()))
-
-
-def rungs(settings: LadderSettings) -> list[Rung]:
+def rungs(settings: LadderSettings) -> list[Measurement]:
     """The evaluations in order."""
-    names = [name for name in (BASE, *settings.stages) if name != BASE or settings.evaluation.base]
-    found = [Rung(name, 0.0, _evaluation(name, 0.0)) for name in names]
-    for rate in settings.evaluation.faults:
-        found += [
-            Rung(name, rate, _evaluation(name, rate))
-            for name in settings.stages
-            if name != STAGES[0]
-        ]
-    return found + [
-        Rung(name, 0.0, _evaluation(name, 0.0)) for name in settings.evaluation.controls
+    told = settings.evaluation
+    names = [name for name in (BASE, *settings.stages) if name != BASE or told.base]
+    later = [name for name in settings.stages if name != STAGES[0]]
+    found = [
+        *((name, 0.0) for name in names),
+        *((name, rate) for rate in told.faults for name in later),
+        *((name, 0.0) for name in told.controls),
+    ]
+    return [
+        Measurement(name, {settings.seed: _evaluation(name, rate)}, rate) for name, rate in found
     ]
 
 
@@ -134,14 +118,13 @@ class _Ladder:
             yield from make.teach(names, run, out, row.teacher)
         if row.sample is not None:
             sample, run = row.sample, f"samples/{number}"
-            yield make.bench_model(
+            yield make.bench(
                 f"{number}/sample",
                 run,
-                model,
+                f"hf:{model}",
                 self.settings.suite,
                 sample.tasks,
-                f"sampling.temperature={sample.temperature}",
-                f"sampling.top_p={sample.top_p}",
+                (f"sampling.temperature={sample.temperature}", f"sampling.top_p={sample.top_p}"),
                 faults=sample.faults,
                 samples=sample.samples,
                 skip=sample.skip,
@@ -194,8 +177,8 @@ class _Ladder:
             play = [f"prompts.dialect={self.settings.dialect}", *sees, *play]
         samples = evaluation.fault_samples if faults and evaluation.fault_samples > 1 else None
         suite, limit = evaluation.suite, evaluation.limit
-        return self.make.bench_model(
-            out, out, model, suite, limit, *play, faults=faults, samples=samples
+        return self.make.bench(
+            out, out, f"hf:{model}", suite, limit, play, faults=faults, samples=samples
         )
 
     def _control(self, name: Control, model: str) -> Phase:
@@ -203,7 +186,7 @@ class _Ladder:
         suite, limit = evaluation.suite, evaluation.limit
         if name == "blind":
             noise = (*evaluation.set, "pictures.noise=true")
-            return self.make.bench_model(out, out, model, suite, limit, *noise)
+            return self.make.bench(out, out, f"hf:{model}", suite, limit, noise)
         return self.make.bench(out, out, name, suite, limit)
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from benchmarks.plan import checks
-from benchmarks.plan.phase import Phase
-from benchmarks.plan.settings import Collected, PlaySettings, Taught
+from benchmarks.study import checks
+from benchmarks.study.phase import Phase
+from benchmarks.study.settings import Collected, PlaySettings, Taught
 
 
 @dataclass(frozen=True)
@@ -59,20 +59,18 @@ class Commands:
             out: the collection's.
             taught: who plays what.
         """
+        played = self.bench(
+            names[0],
+            run,
+            taught.agent,
+            self.settings.suite,
+            taught.tasks,
+            faults=taught.faults,
+            samples=taught.samples,
+            skip=taught.skip,
+        )
         return [
-            self.phase(
-                names[0],
-                run,
-                *self._bench(taught.agent, self.settings.suite, taught.tasks),
-                *(("--skip", str(taught.skip)) if taught.skip else ()),
-                *("--samples", str(taught.samples), "--workers", str(self.settings.workers)),
-                *(("--faults", str(taught.faults)) if taught.faults else ()),
-                checks=(
-                    partial(checks.check_tasks, self.settings, self.settings.suite),
-                    partial(checks.check_agent, taught.agent),
-                    partial(checks.check_skip, self.settings, self.settings.suite, taught.skip),
-                ),
-            ),
+            played,
             self.phase(
                 names[1],
                 out,
@@ -132,53 +130,51 @@ class Commands:
             checks=tuple(checked),
         )
 
-    def bench_model(
+    def bench(
         self,
         name: str,
         out: str,
-        model: str,
+        agent: str,
         suite: str,
         limit: int | None,
-        *changes: str,
+        changes: Sequence[str] | None = None,
+        *,
         faults: float = 0.0,
         samples: int | None = None,
         skip: int = 0,
     ) -> Phase:
-        """Lets a model play; ``changes`` are overrides of the agent's settings."""
+        """Lets an agent play; ``changes`` are overrides of a model's settings, None for an agent
+        that is none of the study's models."""
+        settings = self.settings
+        play = () if changes is None else settings.play
+        checked = (
+            partial(checks.check_agent, agent)
+            if changes is None
+            else partial(checks.check_model_play, (*play, *changes))
+        )
         return self.phase(
             name,
             out,
-            *self._bench(f"hf:{model}", suite, limit),
-            *("--concurrency", str(self.settings.concurrency)),
-            *_overrides(*self.settings.play),
-            *(() if samples is None else ("--samples", str(samples))),
-            *(("--skip", str(skip)) if skip else ()),
-            *(("--faults", str(faults)) if faults else ()),
-            *_overrides(*changes),
-            checks=(
-                partial(checks.check_tasks, self.settings, suite),
-                partial(checks.check_skip, self.settings, suite, skip),
-                partial(checks.check_model_play, (*self.settings.play, *changes)),
-            ),
-        )
-
-    def bench(self, name: str, out: str, agent: str, suite: str, limit: int | None) -> Phase:
-        """Lets an agent play that is no model."""
-        return self.phase(
-            name,
-            out,
-            *self._bench(agent, suite, limit),
-            *("--workers", str(self.settings.workers)),
-            checks=(partial(checks.check_tasks, self.settings, suite),),
-        )
-
-    def _bench(self, agent: str, suite: str, limit: int | None) -> tuple[str, ...]:
-        return (
             *("bench", "--suite", suite, "--agent", agent),
             *(() if limit is None else ("--limit", str(limit), "--spread")),
             *self._instances,
             *self._types,
-            *("--seed", str(self.settings.seed)),
+            *("--seed", str(settings.seed)),
+            *(
+                ("--workers", str(settings.workers))
+                if changes is None
+                else ("--concurrency", str(settings.concurrency))
+            ),
+            *_overrides(*play),
+            *(() if samples is None else ("--samples", str(samples))),
+            *(("--skip", str(skip)) if skip else ()),
+            *(("--faults", str(faults)) if faults else ()),
+            *_overrides(*(changes or ())),
+            checks=(
+                partial(checks.check_tasks, settings, suite),
+                partial(checks.check_skip, settings, suite, skip),
+                checked,
+            ),
         )
 
     @property

@@ -19,7 +19,7 @@ from agents.finetune.architecture import load_architecture
 from agents.finetune.settings import load_settings as load_finetune_settings
 from agents.vlm.factory import is_model_agent
 from agents.vlm.factory import load_settings as load_agent_settings
-from benchmarks.plan.settings import Collected, PlaySettings
+from benchmarks.study.settings import Collected, PlaySettings
 from er_gym.data.dialects import load_dialect
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks.suites import load_suite

@@ -10,8 +10,8 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from benchmarks.plan.phase import Phase
-from benchmarks.plan.settings import FREE, PlaySettings
+from benchmarks.study.phase import Phase
+from benchmarks.study.settings import FREE, PlaySettings
 from er_gym import __version__
 from er_gym.activity import begin
 from er_gym.locking import Locked, exclusive_use

@@ -6,26 +6,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.ablation.settings import AblationSettings, Row
-from benchmarks.plan.commands import Commands
-from benchmarks.plan.phase import Phase
-from benchmarks.plan.run import Plan
+from benchmarks.study.ablation_settings import AblationSettings, Row
+from benchmarks.study.commands import Commands
+from benchmarks.study.phase import Measurement, Phase
 
 
-def plan_of(settings: AblationSettings, root: Path) -> Plan:
-    """All phases of an ablation in order: every row with the first seed, then with the next.
-
-    Args:
-        settings: of the ablation.
-        root: its directory.
-    """
-    phases = tuple(_Ablation(settings, Commands(settings, root)).phases())
-    return Plan("ablation", settings, phases)
+def ablation_phases(settings: AblationSettings, make: Commands) -> Iterator[Phase]:
+    """All phases of an ablation in order: every row with the first seed, then with the next."""
+    return _Ablation(settings, make).phases()
 
 
-def evaluation_of(row: str, seed: int) -> str:
-    """The run directory of a row's evaluation, relative to the ablation's."""
-    return f"evaluations/{row}/{seed}"
+def row_measured(settings: AblationSettings, name: str) -> Measurement:
+    """A row with all of its seeds."""
+    return Measurement(name, {seed: _evaluation(name, seed) for seed in settings.seeds})
 
 
 @dataclass(frozen=True)
@@ -70,8 +63,9 @@ class _Ablation:
                 *step.set,
             )
             model = out
-        out, evaluation = evaluation_of(name, seed), settings.evaluation
-        yield make.bench_model(out, out, make.at(model), evaluation.suite, evaluation.limit)
+        out, evaluation = _evaluation(name, seed), settings.evaluation
+        player = f"hf:{make.at(model)}"
+        yield make.bench(out, out, player, evaluation.suite, evaluation.limit, ())
 
 
 def _collection(name: str) -> str:
@@ -80,3 +74,7 @@ def _collection(name: str) -> str:
 
 def _base(dialect: str, seed: int) -> str:
     return f"bases/{Path(dialect).name}/{seed}"
+
+
+def _evaluation(row: str, seed: int) -> str:
+    return f"evaluations/{row}/{seed}"

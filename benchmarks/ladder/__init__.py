@@ -1,1 +1,0 @@
-"""The paper's ladder: collect, imitate, explore, reflect, and measure after each stage."""
