@@ -23,8 +23,8 @@ from pathlib import Path
 import click
 import numpy as np
 
+from agents.factory import load_settings
 from agents.vlm.chat import Message, Picture
-from agents.vlm.factory import load_settings
 from agents.vlm.pictures import noise_like
 from agents.vlm.settings import AgentSettings
 from agents.vlm.tuned_model import agent_file

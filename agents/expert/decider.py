@@ -22,8 +22,8 @@ from agents.expert.recorder import (
 )
 from agents.expert.replayed_intents import replayed_purpose
 from agents.expert.writers.prompts import WriterPrompts
+from agents.factory import AgentFactory
 from agents.vlm.agent import VLMAgent
-from agents.vlm.factory import AgentFactory
 from er_gym.data.critic import check
 from er_gym.data.knowledge import Knowledge
 from er_gym.data.trajectory import TAG_OF_KIND, Subgoal, ThoughtRecord, Trajectory

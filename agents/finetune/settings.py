@@ -6,16 +6,14 @@ er-gym's own files are ``configs/finetune/NAME.yaml``. Every field has a default
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from agents import configs
+from agents.configs import ConfigKind
 from er_gym.data.trajectory import Language, Trajectory
 
-KIND = "finetune"
-_WHAT = "fine-tuning run"
 Stage: TypeAlias = Literal["imitation", "exploration", "reflection"]
 """The paper's three stages, in order; they make the Interactor, the Explorer and the Reasoner."""
 STAGES: tuple[Stage, ...] = ("imitation", "exploration", "reflection")
@@ -182,15 +180,4 @@ class FinetuneSettings(_Settings):
     training: TrainingSettings = TrainingSettings()
 
 
-def config_names() -> tuple[str, ...]:
-    """The names of er-gym's own fine-tuning configurations, in alphabetical order."""
-    return configs.names(KIND)
-
-
-def load_settings(name: str, overrides: Sequence[str] = ()) -> FinetuneSettings:
-    """Read a run's settings from a file of ``configs/finetune`` by name, or from any file by path.
-
-    Raises:
-        ValueError: the file does not exist, or the file or an override is invalid.
-    """
-    return configs.load(FinetuneSettings, configs.file_of(KIND, name, _WHAT), _WHAT, overrides)
+load_settings = ConfigKind(FinetuneSettings, "finetune", "fine-tuning run").load

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from agents import configs
+from agents.configs import ConfigKind, load
 from er_gym.envs.object_selection import EXPLORE
 from er_gym.tasks.types import canonical_names
 
@@ -263,19 +263,8 @@ class TrainConfig(_Model):
         return self
 
 
-def config_names() -> tuple[str, ...]:
-    """The names of er-gym's own training configurations, in alphabetical order."""
-    return configs.names("rl")
-
-
-def config_file(name: str) -> Path:
-    """The file of a training configuration: a path, or the name of one of er-gym's own.
-
-    Raises:
-        ValueError: the file does not exist; the message lists er-gym's own.
-    """
-    return configs.file_of("rl", name, _WHAT)
-
+CONFIGS = ConfigKind(TrainConfig, "rl", _WHAT)
+config_names, config_file = CONFIGS.names, CONFIGS.file
 
 ALGORITHM_NAMES = {
     "ppo": "MaskablePPO",
@@ -312,4 +301,4 @@ def load_config(
         ValueError: an override has no ``=`` or names an unknown field, or a value is invalid.
         TaskFileError: the file cannot be read. (It is a ValueError.)
     """
-    return configs.load(TrainConfig, file, _WHAT, overrides, more)
+    return load(TrainConfig, file, _WHAT, overrides, more)

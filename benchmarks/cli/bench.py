@@ -400,7 +400,7 @@ def _env_kwargs(
 
 def _vlm_run(agent: str, vlm_options: VLMOptions) -> VLMRun | None:
     """The run of a vision-language agent; None for other agents, which take none of its options."""
-    from agents.vlm.factory import is_model_agent
+    from agents.factory import is_model_agent
     from benchmarks.cli.vlm_run import VLMRun
 
     if is_model_agent(agent):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 FORMATS = ("table", "md")
 DTYPES = ("float16", "bfloat16", "float32")
-"""As in ``agents.zoo.packing``, which imports torch; a test compares."""
+"""As in ``agents.packing``, which imports torch; a test compares."""
 _NAME = re.compile(r"[a-z0-9]+([.-][a-z0-9]+)*")
 _NONE = "-"
 _directory = Place(file_okay=False, path_type=Path)
@@ -124,7 +124,7 @@ def add(
             "single-search"
         )
     try:
-        from agents.zoo import packing
+        from agents import packing
     except ImportError as error:
         raise BadInput(
             f"{error.name or error} is not installed, and packing a model needs it: "

@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 def _settings(text: str, folder: Path) -> None:
-    from agents.vlm.factory import load_settings
+    from agents.factory import load_settings
 
     file = folder / "settings.yaml"
     file.write_text(text, encoding="utf-8")
