@@ -8,13 +8,19 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import yaml
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict
 
 from er_gym.tasks.files import validated
 from er_gym.tasks.reading import parse_yaml, read_yaml
 from er_gym.tasks.suites import config_directory
 
 Settings = TypeVar("Settings", bound=BaseModel)
+
+
+class StrictSettings(BaseModel):
+    """Settings that refuse unknown names and numbers that are not finite."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 def names(kind: str) -> tuple[str, ...]:

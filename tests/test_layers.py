@@ -27,7 +27,7 @@ _OF_AGENTS = {
     "agents.scripted.searcher": set(),
     "agents.scripted": set(),
     "agents.vlm.parsing": set(),
-    "agents.vlm": {"agents.vlm.parsing"},
+    "agents.vlm": {"agents.configs", "agents.vlm.parsing"},
     "agents.vlm.clients": {"agents.vlm", "agents.zoo"},
     "agents.rl": {"agents.configs", "agents.scripted", "agents.scripted.searcher"},
     "agents": {

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from agents.configs import ConfigKind
+from agents.configs import ConfigKind, StrictSettings
 from er_gym.data.trajectory import Language, Trajectory
 
 Stage: TypeAlias = Literal["imitation", "exploration", "reflection"]
@@ -25,11 +25,7 @@ Positive = Annotated[int, Field(gt=0, le=2**31)]
 Rate = Annotated[float, Field(gt=0, le=10)]
 
 
-class _Settings(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Lora(_Settings):
+class Lora(StrictSettings):
     """A low-rank adapter (PEFT's names).
 
     Attributes:
@@ -44,7 +40,7 @@ class Lora(_Settings):
     targets: Literal["all-linear"] | tuple[str, ...] = "all-linear"
 
 
-class ModelSettings(_Settings):
+class ModelSettings(StrictSettings):
     """The model that is tuned.
 
     Attributes:
@@ -62,7 +58,7 @@ class ModelSettings(_Settings):
     attention: str = ""
 
 
-class DataSettings(_Settings):
+class DataSettings(StrictSettings):
     """What is learnt from.
 
     Attributes:
@@ -128,7 +124,7 @@ class DataSettings(_Settings):
                 )
 
 
-class TrainingSettings(_Settings):
+class TrainingSettings(StrictSettings):
     """How it is learnt: parameters of transformers' ``TrainingArguments``, with their meaning.
 
     Attributes:
@@ -164,7 +160,7 @@ class TrainingSettings(_Settings):
     fsdp: str = ""
 
 
-class FinetuneSettings(_Settings):
+class FinetuneSettings(StrictSettings):
     """A fine-tuning run.
 
     Attributes:

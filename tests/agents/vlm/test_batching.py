@@ -45,9 +45,7 @@ def pool() -> Iterator[ThreadPoolExecutor]:
         yield made
 
 
-def asked(
-    pool: ThreadPoolExecutor, batcher: Batches, jobs: Sequence[str]
-) -> list[str | Exception]:
+def asked(pool: ThreadPoolExecutor, batcher: Batches, jobs: Sequence[str]) -> list[str | Exception]:
     """What becomes of jobs, each asked for by a thread of its own, all at once."""
     answers = [pool.submit(batcher.do, job) for job in jobs]
     return [each.exception(LONG) or each.result() for each in answers]  # type: ignore[misc]
