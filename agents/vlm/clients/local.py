@@ -21,7 +21,14 @@ import jinja2
 import torch
 from transformers import DynamicCache
 
-from agents.vlm.chat import ConversationRefused, Message, Picture, Reply, Usage
+from agents.vlm.chat import (
+    ConversationRefused,
+    Message,
+    Picture,
+    Reply,
+    Usage,
+    template_message,
+)
 from agents.vlm.clients.batching import CLOSED, SteppedJobs, batches
 from agents.vlm.clients.checkpoint import load, one_line
 from agents.vlm.clients.kept_turns import (
@@ -206,9 +213,7 @@ class LocalClient:
             # In the text: templates differ in how they take thoughts separately, and most do not
             # take them at all. Templates that drop earlier thoughts find them here too.
             parts.insert(0, f"{_THINK}\n{message.reasoning}\n{_THOUGHT}\n")
-        if any(isinstance(part, Picture) for part in parts):
-            return {"role": message.role, "content": [_part(part) for part in parts]}
-        return {"role": message.role, "content": "\n".join(map(str, parts))}
+        return template_message(message.role, parts)
 
     def _patches(self, pictures: Sequence[Picture]) -> tuple[torch.Tensor, torch.Tensor]:
         if self._image_processor is None:
@@ -410,10 +415,6 @@ def _grids_by_digest(kept: KeptTurns | None) -> dict[str, torch.Tensor]:
     if kept is None or kept.grids is None:
         return {}
     return dict(zip(kept.pictures, kept.grids.split(1), strict=True))
-
-
-def _part(part: str | Picture) -> dict[str, str]:
-    return {"type": "text", "text": part} if isinstance(part, str) else {"type": "image"}
 
 
 def _without_thought(text: str, thinking: bool) -> tuple[str, str]:
