@@ -11,7 +11,7 @@ import pytest
 import yaml
 from click.testing import CliRunner
 
-from agents.finetune.drawing import drawn
+from agents.finetune.samples import drawn
 from agents.finetune.settings import load_settings
 from benchmarks.ablation.phases import plan_of
 from benchmarks.ablation.settings import ablation_names, load_ablation
