@@ -9,16 +9,16 @@ from inspect import signature
 from pathlib import Path
 from typing import Any
 
-from agents.scripted.oracle import OracleAgent
-from agents.scripted.random import RandomAgent
-from agents.scripted.searcher import SearcherAgent
-from agents.vlm.factory import (
+from agents.factory import (
     AgentFactory,
     agent_name_forms,
     is_model_agent,
     load_settings,
     settings_file,
 )
+from agents.scripted.oracle import OracleAgent
+from agents.scripted.random import RandomAgent
+from agents.scripted.searcher import SearcherAgent
 from agents.zoo.index import PREFIX as ZOO_PREFIX
 from agents.zoo.index import resolved
 from er_gym.activity import begin_import
@@ -56,7 +56,7 @@ without arguments."""
 def make_agent(name: str, seed: int = 0) -> Agent:
     """Make an agent by name: one of :data:`AGENTS`, ``package.module:Class``, ``rl:RUN`` for a
     trained policy, ``zoo:NAME`` for a model of the zoo, or a model agent with default settings
-    (:mod:`agents.vlm.factory`).
+    (:mod:`agents.factory`).
 
     Args:
         name: the agent's name.

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 import yaml
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict
 
 from er_gym.tasks.files import validated
 from er_gym.tasks.reading import parse_yaml, read_yaml
 from er_gym.tasks.suites import config_directory
 
 Settings = TypeVar("Settings", bound=BaseModel)
+
+
+class StrictSettings(BaseModel):
+    """Settings that refuse unknown names and numbers that are not finite."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 def names(kind: str) -> tuple[str, ...]:
@@ -80,6 +87,37 @@ def load(
         return f"{file}: the {what}" if file else f"the {what}"
 
     return validated(model, {**data, **(more or {})}, where)
+
+
+@dataclass(frozen=True)
+class ConfigKind(Generic[Settings]):
+    """A kind of configuration file, of which er-gym has some of its own.
+
+    Attributes:
+        model: the pydantic model of the settings.
+        folder: the directory of ``configs`` with er-gym's own.
+        what: what such a file describes, for messages.
+    """
+
+    model: type[Settings]
+    folder: str
+    what: str
+
+    def names(self) -> tuple[str, ...]:
+        """The names of er-gym's own files, in alphabetical order."""
+        return names(self.folder)
+
+    def file(self, name: str) -> Path:
+        """The path of a file, given it or the name of one of er-gym's own; see :func:`file_of`."""
+        return file_of(self.folder, name, self.what)
+
+    def load(self, name: str, overrides: Sequence[str] = ()) -> Settings:
+        """Read a file by its path or by the name of one of er-gym's own.
+
+        Raises:
+            ValueError: the file does not exist, or the file or an override is invalid.
+        """
+        return load(self.model, self.file(name), self.what, overrides)
 
 
 def _read(file: Path, what: str) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from typing import Any
 
 from inspect_ai.model import Model, ModelCall, ModelOutput, get_model
 
-from agents.vlm.clients.redaction import Secrets
 from agents.vlm.record import url_without_secrets
+from agents.vlm.redaction import Secrets
 
 _DONE = "_er_gym_discreet"
 

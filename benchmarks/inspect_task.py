@@ -41,6 +41,7 @@ from inspect_ai.solver import Generate, Solver, TaskState, solver
 from inspect_ai.tool import ToolFunction, ToolInfo
 from inspect_ai.util import JSONSchema
 
+from agents.factory import load_settings
 from agents.vlm.agent import VLMAgent
 from agents.vlm.chat import (
     ConversationRefused,
@@ -52,7 +53,6 @@ from agents.vlm.chat import (
     Usage,
 )
 from agents.vlm.clients.decision_schema import REQUEST_FIELDS
-from agents.vlm.factory import load_settings
 from agents.vlm.matching import Matcher
 from agents.vlm.prompts import prompts_for
 from agents.vlm.settings import AgentSettings

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from agents.factory import AgentFactory, comparable_settings, load_settings, settings_file
 from agents.vlm.clients.budget import Budget
 from agents.vlm.clients.session import ModelSession
-from agents.vlm.factory import AgentFactory, comparable_settings, load_settings, settings_file
 from agents.vlm.prompts import prompts_for
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout import runner

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from agents.expert.acceptance import PlayedCourse, rejection
+from agents.expert.audition import SilentAgent
 from agents.expert.candidates import Candidate, CandidateSequence
 from agents.expert.course import Course, Intent, View
 from agents.expert.recipe import Part
-from agents.expert.silent import SilentAgent
 from agents.expert.thought_kinds import load_thought_kinds
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.play import episode_seed, play_episode

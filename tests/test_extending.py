@@ -18,7 +18,7 @@ runpy.run_module("household.play")
 
 from agents import make_agent
 from agents.vlm.settings import AgentSettings
-from agents.vlm.factory import AgentFactory
+from agents.factory import AgentFactory
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks import load_suite
 from er_gym.tasks.paraphrase import load_ask

@@ -21,7 +21,31 @@ _TASKS = {*_BASE, "er_gym.thor", "er_gym.tasks"}
 _ENVS = {*_TASKS, "er_gym.envs"}
 _ROLLOUT = {*_ENVS, "er_gym", "er_gym.resumable", "er_gym.rollout"}
 _DATA = {*_ROLLOUT, "er_gym.data"}
-_AGENTS = {*_DATA, "agents"}
+_VLM = {"agents.vlm.parsing", "agents.vlm", "agents.vlm.clients"}
+_OF_AGENTS = {
+    "agents.configs": set(),
+    "agents.zoo": set(),
+    "agents.scripted.searcher": set(),
+    "agents.scripted": set(),
+    "agents.vlm.parsing": set(),
+    "agents.vlm": {"agents.configs", "agents.vlm.parsing"},
+    "agents.vlm.clients": {"agents.vlm", "agents.zoo"},
+    "agents.rl": {"agents.configs", "agents.scripted", "agents.scripted.searcher"},
+    "agents": {
+        *("agents.configs", "agents.zoo", "agents.rl", *_VLM),
+        *("agents.scripted", "agents.scripted.searcher"),
+    },
+    "agents.expert.writers": {"agents.scripted.searcher", "agents.vlm"},
+    "agents.expert": {
+        *("agents", "agents.configs", "agents.expert.writers"),
+        *("agents.scripted.searcher", "agents.vlm"),
+    },
+    "agents.finetune": {"agents.configs", "agents.vlm", "agents.vlm.clients"},
+    "agents.finetune.printing": {"agents.configs", "agents.finetune"},
+}
+"""The folders of ``agents`` to the other ones that they may import, besides what is below
+``agents``; ``agents`` alone is its own top-level modules."""
+_AGENTS = {*_DATA, *_OF_AGENTS}
 _SCORING = {*_DATA, "benchmarks.scoring", "benchmarks.terminal"}
 _MONITOR = {*_AGENTS, *_SCORING, "benchmarks", "benchmarks.vlm_run", "benchmarks.monitor"}
 _COMMAND = {*_MONITOR, "benchmarks.cli"}
@@ -42,7 +66,7 @@ ALLOWED = {
     "er_gym.resumable": _TASKS,
     "er_gym.rollout": _ROLLOUT,
     "er_gym.data": _DATA,
-    "agents": _AGENTS,
+    **{name: {*_DATA, name, *others} for name, others in _OF_AGENTS.items()},
     "benchmarks.scoring": _SCORING,
     "benchmarks.terminal": {*_ENVS, "benchmarks.terminal"},
     "benchmarks.vlm_run": _AGENTS,
@@ -104,6 +128,16 @@ def test_imports_only_from_layers_below(path: Path) -> None:
     assert not wrong
 
 
+def test_each_folder_of_the_agents_has_its_rule() -> None:
+    folders = {".".join(path.parent.relative_to(ROOT).parts) for path in SOURCES}
+    shared = {"agents.configs"}  # a module
+    assert {each for each in folders if each.startswith("agents")} == {*_OF_AGENTS} - shared
+
+
+def test_the_folders_of_the_agents_form_no_circle() -> None:
+    TopologicalSorter(_OF_AGENTS).prepare()
+
+
 def test_no_module_imports_itself_by_way_of_others() -> None:
     """Late imports, and those for types alone, count too."""
     names = {module_name(path): path for path in SOURCES}
@@ -132,7 +166,7 @@ def test_sees_late_and_relative_imports() -> None:
     source = "def f():\n    from ..sim import scene\n    import agents.vlm\n"
     found = list(imported_modules(source, "er_gym.envs"))
     assert found == [(2, "er_gym.sim.scene"), (3, "agents.vlm")]
-    assert [layer(module) for _, module in found] == ["er_gym.sim", "agents"]
+    assert [layer(module) for _, module in found] == ["er_gym.sim", "agents.vlm"]
 
 
 def test_an_unlisted_layer_is_not_taken_for_another() -> None:

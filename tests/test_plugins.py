@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from agents import make_agent
+from agents.factory import AgentFactory
 from agents.vlm.clients.registry import CLIENTS, is_model_agent, resolve_client
-from agents.vlm.factory import AgentFactory
 from agents.vlm.settings import AgentSettings
 from er_gym import plugins
 from er_gym.envs.embodied_env import EmbodiedEnv

@@ -26,7 +26,7 @@ for module, names in {
 IMPORT = """
 import er_gym
 import agents, benchmarks.cli.main, er_gym.rollout.runner, er_gym.thor.player_install
-import agents.vlm.factory
+import agents.factory
 import benchmarks.scoring.report, er_gym.data.collection, er_gym.sim.transports
 """
 PLAY = """

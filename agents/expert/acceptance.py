@@ -10,7 +10,12 @@ from agents.expert.recipe import ANOMALY, CORRECTED, SEARCH
 from er_gym.data.course_checks import SHORTEST, are_key_actions
 from er_gym.data.trajectory import Trajectory
 from er_gym.envs.actions import Action
-from er_gym.rollout.records import EpisodeRecord, KeyActionRecord
+from er_gym.rollout.records import EpisodeRecord, KeyActionRecord, StepRecord
+
+
+def steps_of(episode: EpisodeRecord) -> list[StepRecord]:
+    """The steps that the agent took."""
+    return [step for step in episode.steps[1:] if not step.appended]
 
 
 @dataclass(frozen=True)
@@ -47,7 +52,7 @@ class PlayedCourse:
     @classmethod
     def of_episode(cls, episode: EpisodeRecord, kind: str, mode: str) -> PlayedCourse:
         """The course of an episode that an expert or an explorer played."""
-        steps = [step for step in episode.steps[1:] if not step.appended]
+        steps = steps_of(episode)
         return cls(
             kind,
             mode,

@@ -17,13 +17,15 @@ from typing import Any
 from agents.expert.acceptance import PlayedCourse, rejection
 from agents.expert.candidates import Candidate
 from agents.expert.corrections import beginning_of
-from agents.expert.silent import SilentAgent
+from agents.expert.course import Course, Intent, View
 from agents.expert.thought_kinds import ThoughtKinds
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.rollout.agent import Decision
 from er_gym.rollout.machines import THIS_MACHINE, Machines
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.worker_pool import LostJob
+from er_gym.tasks.task import Task
 
 ATTEMPT = "attempt"
 """What corrections name as the run of an episode that was only attempted."""
@@ -89,6 +91,26 @@ def _jobs(candidates: Iterable[Candidate]) -> Iterator[tuple[Candidate, ...]]:
 
 def _room(job: Sequence[Candidate]) -> str:
     return job[0].task.scene
+
+
+class SilentAgent:
+    """Does what a course decides; for episodes of which only the actions are wanted."""
+
+    obs_mode = "objects"
+
+    def __init__(self, course: Course) -> None:
+        self._course = course
+
+    def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+        """Begin an episode."""
+        self._intents: Iterator[Intent] | None = None
+
+    def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
+        """The course's next action."""
+        self._course.view = View.of(info)
+        if self._intents is None:
+            self._intents = self._course.intents()
+        return Decision(next(self._intents).action)
 
 
 class _Auditions:

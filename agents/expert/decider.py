@@ -11,6 +11,7 @@ from agents.expert.candidates import Candidate, Candidates
 from agents.expert.course import Intent, View
 from agents.expert.explorer import Strength
 from agents.expert.legs import at_hand, legs_of
+from agents.expert.own_words import KIND_OF_TAG
 from agents.expert.players import PlaySettings, header_of
 from agents.expert.recipe import Part, Recipe
 from agents.expert.recorder import (
@@ -22,11 +23,9 @@ from agents.expert.recorder import (
 )
 from agents.expert.replayed_intents import replayed_purpose
 from agents.expert.writers.prompts import WriterPrompts
+from agents.factory import AgentFactory
 from agents.vlm.agent import VLMAgent
-from agents.vlm.factory import AgentFactory
-from er_gym.data.critic import check
-from er_gym.data.knowledge import Knowledge
-from er_gym.data.trajectory import TAG_OF_KIND, Subgoal, ThoughtRecord, Trajectory
+from er_gym.data.trajectory import Subgoal, Trajectory
 from er_gym.envs.actions import Action
 from er_gym.rollout.agent import Agent, Decision, MakeAgent
 from er_gym.rollout.records import ERROR, EpisodeRecord
@@ -35,7 +34,6 @@ from er_gym.tasks.task import Task
 
 MODEL = "model"
 """The kind of a trajectory whose actions a model decided, and the part that has them."""
-_KIND_OF_TAG = {tag: kind for kind, tag in TAG_OF_KIND.items()}
 
 
 class DecidingAgent:
@@ -96,13 +94,12 @@ class DecidingAgent:
             plan=(action.object_type,) if action.verb == verbs.NAVIGATE else (),
         )
         recorder.begin_turn(intent, obs, info)
-        now = len(recorder.turns) - 1
-        knowledge = recorder.knowledge(now)
-        thoughts = [
-            self._record(_KIND_OF_TAG[each.kind], each.text, knowledge)
-            for each in self._agent.rounds[-1].thoughts
-        ]
-        recorder.think(now, thoughts)
+        thoughts = recorder.think_own(
+            len(recorder.turns) - 1,
+            [(KIND_OF_TAG[each.kind], each.text) for each in self._agent.rounds[-1].thoughts],
+            self._name,
+            self._settings.kinds.limits["alone"],
+        )
         if decision.reply is not None:
             recorder.pay([decision.reply])
         return Decision(decision.action, spoken(thoughts), decision.reply, causes=decision.causes)
@@ -115,14 +112,6 @@ class DecidingAgent:
         """What the next action may be for: the first part of the task that is not done."""
         here = at_hand(self._legs, view.left)
         return here[1] if here else Subgoal()
-
-    def _record(self, kind: Any, text: str, knowledge: Knowledge) -> ThoughtRecord:
-        """A thought, with the reasons of the critic against it."""
-        limit = self._settings.kinds.limits["alone"][kind]
-        refused = [each.code for each in check(text, kind, knowledge, limit=limit)]
-        return ThoughtRecord(
-            kind=kind, text=text, writer=self._name, refused=[*dict.fromkeys(refused)]
-        )
 
 
 @dataclass(frozen=True)

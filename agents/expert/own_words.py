@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from agents.expert.acceptance import steps_of
 from agents.vlm.record import ConversationRecord, MessageRecord, RoundRecord
 from er_gym.data.dialects import dialect_names, load_dialect
 from er_gym.data.trajectory import TAG_OF_KIND, Language, ThoughtKind
@@ -20,7 +21,7 @@ from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.reading import read_bytes
 from er_gym.writing import file_stem
 
-_KIND_OF_TAG = {tag: kind for kind, tag in TAG_OF_KIND.items()}
+KIND_OF_TAG: Mapping[str, ThoughtKind] = {tag: kind for kind, tag in TAG_OF_KIND.items()}
 _UNSAID: ThoughtKind = "reasoning"
 """The kind of a thought whose kind nothing says."""
 _ENDS = (".", "!", "?", "…", "。", "！", "？", "\n", '"', "”")
@@ -73,7 +74,7 @@ def own_words(run: Path, episode: EpisodeRecord) -> OwnWords | None:
         record = ConversationRecord.model_validate_json(read_bytes(file))
     except (TaskFileError, ValidationError):
         raise ValueError(f"{file} cannot be read as a conversation") from None
-    steps = [step for step in episode.steps[1:] if not step.appended]
+    steps = steps_of(episode)
     if len(record.rounds) != len(steps) or record.task_id != episode.key:
         raise ValueError(
             f"{file} has {len(record.rounds)} replies about {record.task_id!r:.80}, but the "
@@ -98,7 +99,7 @@ def _said(
     )
     thoughts: list[tuple[ThoughtKind, str]] = []
     for each in this.thoughts:
-        kind = _KIND_OF_TAG.get(each.kind, _UNSAID)
+        kind = KIND_OF_TAG.get(each.kind, _UNSAID)
         words = each.text.strip()
         if kind == _UNSAID and text.lstrip().startswith(words):  # not in a tag
             thoughts += split_speech(words, dialect, language)

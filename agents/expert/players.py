@@ -88,34 +88,32 @@ class Thinkers:
         self, candidates: Mapping[str, Candidate], settings: PlaySettings, most_actions: int
     ) -> MakeAgent:
         """See :class:`Players`."""
-        return _MakeThinker(self, candidates, settings, most_actions)
+        return partial(self._agent, candidates, settings, most_actions)
 
-    def rejection(self, trajectory: Trajectory, most_actions: int) -> str:
-        """See :func:`agents.expert.acceptance.rejection`."""
-        return rejection(PlayedCourse.of_trajectory(trajectory), most_actions)
-
-
-@dataclass(frozen=True)
-class _MakeThinker:
-    players: Thinkers
-    candidates: Mapping[str, Candidate]
-    settings: PlaySettings
-    most_actions: int
-
-    def __call__(self, task: Task, seed: int) -> Agent:
-        candidate, settings = self.candidates[task.id], self.settings
-        places = self.players.make_places(seed)
+    def _agent(
+        self,
+        candidates: Mapping[str, Candidate],
+        settings: PlaySettings,
+        most_actions: int,
+        task: Task,
+        seed: int,
+    ) -> Agent:
+        candidate, places = candidates[task.id], self.make_places(seed)
         return ThinkingAgent(
             candidate.course(seed, settings.kinds, places),
             header_of(candidate, settings),
             settings.kinds,
-            self.players.make_writer(),
+            self.make_writer(),
             settings.pictures,
             seed,
-            rejects=partial(self.players.rejection, most_actions=self.most_actions),
+            rejects=partial(self.rejection, most_actions=most_actions),
             places=places,
-            think_later=self.players.think_later,
+            think_later=self.think_later,
         )
+
+    def rejection(self, trajectory: Trajectory, most_actions: int) -> str:
+        """See :func:`agents.expert.acceptance.rejection`."""
+        return rejection(PlayedCourse.of_trajectory(trajectory), most_actions)
 
 
 def header_of(candidate: Candidate, settings: PlaySettings) -> TrajectoryHeader:

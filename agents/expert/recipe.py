@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from agents import configs
+from agents.configs import ConfigKind
 from agents.expert.explorer import Strength
 from agents.expert.kinds import MODES
 from er_gym.envs.faults import fault_rates
@@ -124,13 +124,12 @@ class Recipe(BaseModel):
         return self.model_copy(update={"parts": chosen})
 
 
-def load_recipe(name: str = DEFAULT) -> Recipe:
-    """Read a recipe of ``configs/collections`` by name, or any YAML file by path.
+RECIPES = ConfigKind(Recipe, "collections", "recipe")
 
-    Raises:
-        ValueError: there is no such file, or it is not a recipe.
-    """
-    return configs.load(Recipe, configs.file_of("collections", name, "recipe"), "recipe")
+
+def load_recipe(name: str = DEFAULT) -> Recipe:
+    """Read a recipe by name or path; see :meth:`agents.configs.ConfigKind.load`."""
+    return RECIPES.load(name)
 
 
 def quotas(recipe: Recipe, limit: int | None, types: set[str]) -> dict[tuple[str, str], int]:

@@ -15,6 +15,7 @@ from agents.vlm.chat import Picture
 from agents.vlm.pictures import encode
 from agents.vlm.settings import Pictures
 from er_gym.data.collection import PLAYED
+from er_gym.data.critic import check
 from er_gym.data.dialects import shows_anew
 from er_gym.data.knowledge import Knowledge, knowledge_at
 from er_gym.data.trajectory import (
@@ -23,6 +24,7 @@ from er_gym.data.trajectory import (
     Language,
     PictureRecord,
     SeenObject,
+    ThoughtKind,
     ThoughtRecord,
     Trajectory,
     Turn,
@@ -157,6 +159,30 @@ class TrajectoryRecorder:
     def think(self, index: int, thoughts: Iterable[ThoughtRecord]) -> None:
         """Give a turn its thoughts."""
         self.turns[index] = self.turns[index].model_copy(update={"thoughts": list(thoughts)})
+
+    def think_own(
+        self,
+        index: int,
+        thoughts: Iterable[tuple[ThoughtKind, str]],
+        writer: str,
+        limits: Mapping[ThoughtKind, int],
+    ) -> list[ThoughtRecord]:
+        """Give a turn the thoughts of who decided it; the critic's refusals are only recorded.
+
+        Args:
+            index: of the turn.
+            thoughts: kind and text.
+            writer: who thought so.
+            limits: the most words of a thought of each kind.
+        """
+        knowledge = self.knowledge(index)
+        records = []
+        for kind, text in thoughts:
+            codes = [one.code for one in check(text, kind, knowledge, limit=limits[kind])]
+            refused = [*dict.fromkeys(codes)]
+            records.append(ThoughtRecord(kind=kind, text=text, writer=writer, refused=refused))
+        self.think(index, records)
+        return records
 
     def pay(self, replies: Iterable[ModelReply]) -> None:
         """Add what replies cost; those from the cache too, which an earlier try paid for."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+from agents.expert.acceptance import steps_of
 from agents.expert.candidates import Candidate
 from agents.expert.course import Intent, View
 from agents.expert.legs import legs_of
@@ -24,8 +25,7 @@ from agents.expert.recorder import (
 from agents.expert.replayed_intents import replayed_intent
 from agents.expert.thinker import ThinkingAgent
 from agents.expert.writers.base import ThoughtWriter
-from er_gym.data.critic import check
-from er_gym.data.trajectory import Subgoal, ThoughtRecord, Trajectory
+from er_gym.data.trajectory import Subgoal, Trajectory
 from er_gym.envs.actions import Action
 from er_gym.rollout.agent import Agent, Decision, MakeAgent
 from er_gym.rollout.records import EpisodeRecord, StepRecord
@@ -37,11 +37,6 @@ PLAYED = "played"
 """The kind of a trajectory that was played before by some agent."""
 DIFFERS = "its replay came out differently"
 CRITIC = "the critic refuses a thought"
-
-
-def steps_of(episode: EpisodeRecord) -> list[StepRecord]:
-    """The steps that the agent took."""
-    return [step for step in episode.steps[1:] if not step.appended]
 
 
 class ReplayedCourse:
@@ -125,17 +120,8 @@ class QuotingAgent:
             return Decision(intent.action)
         said = self._words.turns[now]
         recorder.pay([said.reply])
-        knowledge = recorder.knowledge(now)
-        thoughts = []
-        for kind, text in said.thoughts:
-            limit = self._settings.kinds.limits["alone"][kind]
-            codes = [one.code for one in check(text, kind, knowledge, limit=limit)]
-            thoughts.append(
-                ThoughtRecord(
-                    kind=kind, text=text, writer=self._name, refused=[*dict.fromkeys(codes)]
-                )
-            )
-        recorder.think(now, thoughts)
+        limits = self._settings.kinds.limits["alone"]
+        thoughts = recorder.think_own(now, said.thoughts, self._name, limits)
         return Decision(intent.action, spoken(thoughts))
 
     def attachments(self, episode: EpisodeRecord, stem: str) -> dict[str, bytes]:
@@ -166,28 +152,12 @@ class Replayers:
         self, candidates: Mapping[str, Candidate], settings: PlaySettings, most_actions: int
     ) -> MakeAgent:
         """See :class:`~agents.expert.players.Players`."""
-        return _MakeReplayer(self.make_writer, candidates, settings, self.rewrite, self.strict)
+        return partial(self._agent, candidates, settings)
 
-    def rejection(self, trajectory: Trajectory, most_actions: int) -> str:
-        """Why a replay is not taken, ``""`` if it is."""
-        candidate = self.candidates[trajectory.id]
-        try:
-            episode = _run(Path(candidate.run)).episode(candidate.episode)
-        except ValueError:
-            return DIFFERS
-        return replay_rejection(trajectory, episode=episode, strict=self.strict)
-
-
-@dataclass(frozen=True)
-class _MakeReplayer:
-    make_writer: Callable[[], ThoughtWriter]
-    candidates: Mapping[str, Candidate]
-    settings: PlaySettings
-    rewrite: bool
-    strict: bool
-
-    def __call__(self, task: Task, seed: int) -> Agent:
-        candidate, settings = self.candidates[task.id], self.settings
+    def _agent(
+        self, candidates: Mapping[str, Candidate], settings: PlaySettings, task: Task, seed: int
+    ) -> Agent:
+        candidate = candidates[task.id]
         run = _run(Path(candidate.run))
         episode = run.episode(candidate.episode)
         rejects = partial(replay_rejection, episode=episode, strict=self.strict)
@@ -204,8 +174,17 @@ class _MakeReplayer:
                 seed,
                 rejects=rejects,
             )
-        spoken_in = TrajectoryHeader(**{**vars(header), "language": words.language})
+        spoken_in = replace(header, language=words.language)
         return QuotingAgent(course, words, candidate.actor, spoken_in, settings, rejects)
+
+    def rejection(self, trajectory: Trajectory, most_actions: int) -> str:
+        """Why a replay is not taken, ``""`` if it is."""
+        candidate = self.candidates[trajectory.id]
+        try:
+            episode = _run(Path(candidate.run)).episode(candidate.episode)
+        except ValueError:
+            return DIFFERS
+        return replay_rejection(trajectory, episode=episode, strict=self.strict)
 
 
 def replay_rejection(trajectory: Trajectory, *, episode: EpisodeRecord, strict: bool) -> str:

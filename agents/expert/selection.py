@@ -14,12 +14,13 @@ from dataclasses import dataclass, field
 from math import ceil, floor
 from typing import Any, Literal
 
+from agents.expert.acceptance import steps_of
 from agents.expert.candidates import Candidate, FixedCandidates
 from agents.expert.collect import Stratum
 from agents.expert.explorer import Strength
 from agents.expert.own_words import own_words
 from agents.expert.recipe import Part, Recipe, quotas
-from agents.expert.replayed import PLAYED, steps_of
+from agents.expert.replayed import PLAYED
 from er_gym.rollout.judgement import judged
 from er_gym.rollout.records import ERROR, EpisodeRecord
 from er_gym.rollout.run_directory import RunDirectory

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from functools import lru_cache
-from pathlib import Path
 from random import Random
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from agents import configs
+from agents.configs import ConfigKind
 from er_gym.data.trajectory import THOUGHT_KINDS, ThoughtKind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TRANSPORT
@@ -117,12 +116,10 @@ def _task_kind(task: Task) -> TaskKind:
     return "transfer" if task.type.group == TRANSPORT else "single"
 
 
+KINDS = ConfigKind(ThoughtKinds, "thoughts", "table of transitions")
+
+
 @lru_cache(maxsize=8)
 def load_thought_kinds(name: str = "transitions") -> ThoughtKinds:
-    """Read a table of ``configs/thoughts`` by name, or any YAML file by path.
-
-    Raises:
-        ValueError: there is no such file, or it is not such a table.
-    """
-    file: Path = configs.file_of("thoughts", name, "table of transitions")
-    return configs.load(ThoughtKinds, file, "table of transitions")
+    """Read a table by name or path; see :meth:`agents.configs.ConfigKind.load`."""
+    return KINDS.load(name)

@@ -5,15 +5,13 @@ er-gym's own files are ``configs/architectures/NAME.yaml``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from agents import configs
+from agents.configs import ConfigKind
 
-KIND = "architectures"
-_WHAT = "architecture"
 Family: TypeAlias = Literal["llama", "qwen2", "qwen3", "qwen2_vl", "qwen2_5_vl", "qwen3_vl"]
 """Architectures of transformers, by ``model_type``."""
 BYTES = 256
@@ -45,15 +43,4 @@ class Architecture(BaseModel):
         return self.family.endswith("_vl")
 
 
-def architecture_names() -> tuple[str, ...]:
-    """The names of er-gym's own architectures, in alphabetical order."""
-    return configs.names(KIND)
-
-
-def load_architecture(name: str, overrides: Sequence[str] = ()) -> Architecture:
-    """Read an architecture from a file of ``configs/architectures`` by name, or from any file.
-
-    Raises:
-        ValueError: the file does not exist, or the file or an override is invalid.
-    """
-    return configs.load(Architecture, configs.file_of(KIND, name, _WHAT), _WHAT, overrides)
+load_architecture = ConfigKind(Architecture, "architectures", "architecture").load

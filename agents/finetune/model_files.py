@@ -25,13 +25,11 @@ from agents.finetune.settings import Stage
 from agents.vlm.clients.adapters import base_directory
 from agents.vlm.clients.checkpoint import one_line
 from agents.vlm.clients.checkpoint import template_of as template_of_files
+from agents.vlm.tuned_model import AGENT, model_directory
 from er_gym.tasks.reading import read_bytes, read_yaml
 from er_gym.writing import YAML_MARK, write_atomic
 
-MODEL = "model"
-MANIFEST = "finetune.json"
 HISTORY = "finetune_history.json"
-AGENT = "agent.yaml"
 _WEIGHTS = (".safetensors", ".bin")
 _BLOCK = 1 << 16
 _PROCESSOR = (
@@ -133,14 +131,7 @@ def open_model(path: Path) -> ModelFiles:
     if not path.is_dir():
         raise ValueError(f"{path} is not a directory; give one with a model in it, or a run of "
                          "er-gym finetune")  # fmt: skip
-    if (path / MANIFEST).is_file():
-        if not (path / MODEL).is_dir():
-            raise ValueError(
-                f"{path} is a fine-tuning run that is not finished, so it has no model yet; run "
-                "its command again until it is"
-            )
-        path = path / MODEL
-    path = path.resolve()
+    path = Path(model_directory(str(path))).resolve()
     base = base_directory(path)
     if not (base / "config.json").is_file():
         raise ValueError(f"{base} has no config.json, so it is no model; give a directory that "

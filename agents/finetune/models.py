@@ -9,12 +9,10 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from agents import configs
+from agents.configs import ConfigKind
 from agents.finetune.memory import ModelNumbers, numbers_of
 from er_gym.tasks.reading import parse_json, read_text
 
-KIND = "models"
-_WHAT = "model"
 _MOST_TIMES_LONGER = 200
 """Qwen's image processor refuses pictures with a longer side than this many times the shorter."""
 
@@ -70,18 +68,8 @@ class ChosenModel:
     weights: str
 
 
-def model_names() -> tuple[str, ...]:
-    """The models that er-gym knows, in alphabetical order."""
-    return configs.names(KIND)
-
-
-def load_facts(name: str) -> ModelFacts:
-    """What is known of a model, by its name in ``configs/models`` or the path of such a file.
-
-    Raises:
-        ValueError: there is no such model; the message lists the known ones.
-    """
-    return configs.load(ModelFacts, configs.file_of(KIND, name, _WHAT), _WHAT)
+MODELS = ConfigKind(ModelFacts, "models", "model")
+model_names, load_facts = MODELS.names, MODELS.load
 
 
 def choose_model(text: str) -> ChosenModel:

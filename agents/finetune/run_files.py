@@ -25,7 +25,9 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from agents.finetune.model_files import MANIFEST, MODEL, History
+from agents.finetune.model_files import History
+from agents.vlm.tuned_model import MODEL
+from agents.vlm.tuned_model import RUN as MANIFEST
 from er_gym.resumable import FolderKind
 from er_gym.writing import make_folder, write_atomic
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import random
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from agents.finetune.drawing import drawn
 from agents.finetune.settings import DataSettings
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import MANIFEST, Collection
@@ -20,6 +20,8 @@ from er_gym.data.sharegpt_files import open_sharegpt
 from er_gym.data.trajectory import PictureRecord
 from er_gym.tasks.splits import EVALUATION_SCENES
 from er_gym.writing import inside
+
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,24 @@ def open_samples(paths: Sequence[Path], settings: DataSettings) -> Samples:
     chats = tuple(_with_paths(chat, source) for chat, source in found)
     _check_pictures(chats)
     return Samples(chats, digest, first.prompts, first.recorded, len(every) - len(found))
+
+
+def drawn(items: Iterable[Item], limit: int | None) -> Iterable[Item]:
+    """All items, or so many of them, drawn at random: data is often ordered by task type.
+
+    The draw is always the same, a smaller one is part of a larger one, and the items keep their
+    order.
+
+    Args:
+        items: what is drawn from; read at once only if there is a limit.
+        limit: how many at most; None for all.
+    """
+    if limit is None:
+        return items
+    every = list(items)
+    places = list(range(len(every)))
+    random.Random(0).shuffle(places)
+    return [every[place] for place in sorted(places[:limit])]
 
 
 def _opened(path: Path, settings: DataSettings) -> _Source:

@@ -6,16 +6,14 @@ er-gym's own files are ``configs/finetune/NAME.yaml``. Every field has a default
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from agents import configs
+from agents.configs import ConfigKind, StrictSettings
 from er_gym.data.trajectory import Language, Trajectory
 
-KIND = "finetune"
-_WHAT = "fine-tuning run"
 Stage: TypeAlias = Literal["imitation", "exploration", "reflection"]
 """The paper's three stages, in order; they make the Interactor, the Explorer and the Reasoner."""
 STAGES: tuple[Stage, ...] = ("imitation", "exploration", "reflection")
@@ -27,11 +25,7 @@ Positive = Annotated[int, Field(gt=0, le=2**31)]
 Rate = Annotated[float, Field(gt=0, le=10)]
 
 
-class _Settings(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Lora(_Settings):
+class Lora(StrictSettings):
     """A low-rank adapter (PEFT's names).
 
     Attributes:
@@ -46,7 +40,7 @@ class Lora(_Settings):
     targets: Literal["all-linear"] | tuple[str, ...] = "all-linear"
 
 
-class ModelSettings(_Settings):
+class ModelSettings(StrictSettings):
     """The model that is tuned.
 
     Attributes:
@@ -64,7 +58,7 @@ class ModelSettings(_Settings):
     attention: str = ""
 
 
-class DataSettings(_Settings):
+class DataSettings(StrictSettings):
     """What is learnt from.
 
     Attributes:
@@ -130,7 +124,7 @@ class DataSettings(_Settings):
                 )
 
 
-class TrainingSettings(_Settings):
+class TrainingSettings(StrictSettings):
     """How it is learnt: parameters of transformers' ``TrainingArguments``, with their meaning.
 
     Attributes:
@@ -166,7 +160,7 @@ class TrainingSettings(_Settings):
     fsdp: str = ""
 
 
-class FinetuneSettings(_Settings):
+class FinetuneSettings(StrictSettings):
     """A fine-tuning run.
 
     Attributes:
@@ -182,15 +176,4 @@ class FinetuneSettings(_Settings):
     training: TrainingSettings = TrainingSettings()
 
 
-def config_names() -> tuple[str, ...]:
-    """The names of er-gym's own fine-tuning configurations, in alphabetical order."""
-    return configs.names(KIND)
-
-
-def load_settings(name: str, overrides: Sequence[str] = ()) -> FinetuneSettings:
-    """Read a run's settings from a file of ``configs/finetune`` by name, or from any file by path.
-
-    Raises:
-        ValueError: the file does not exist, or the file or an override is invalid.
-    """
-    return configs.load(FinetuneSettings, configs.file_of(KIND, name, _WHAT), _WHAT, overrides)
+load_settings = ConfigKind(FinetuneSettings, "finetune", "fine-tuning run").load

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.finetune.settings import DataSettings, Mask
+from agents.vlm.chat import template_message
 from er_gym.data.cells import CoveredPicture, on_grid
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.train_mask import train_mask
@@ -111,7 +112,9 @@ class Encoder:
 
     def text(self, turns: Sequence[ChatTurn], *, reply_next: bool = False) -> str:
         """A conversation in the model's format; at its end the assistant may be asked to speak."""
-        return self._rendered([_message(turn) for turn in turns], reply_next)
+        return self._rendered(
+            [template_message(turn.role, turn.parts) for turn in turns], reply_next
+        )
 
     def encode(self, chat: Chat) -> EncodedChat:
         """A conversation in tokens.
@@ -274,14 +277,3 @@ def check_lengths(chats: Sequence[EncodedChat], limit: int, where: Path | str) -
         + (" or a lower data.max_pixels" if pictures else "")
         + " (nothing is ever cut off)"
     )
-
-
-def _message(turn: ChatTurn) -> dict[str, Any]:
-    """A message as agents/vlm/clients/local.py gives it to the template."""
-    if turn.pictures:
-        blocks = [
-            {"type": "text", "text": part} if isinstance(part, str) else {"type": "image"}
-            for part in turn.parts
-        ]
-        return {"role": turn.role, "content": blocks}
-    return {"role": turn.role, "content": "\n".join(map(str, turn.parts))}

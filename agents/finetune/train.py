@@ -43,7 +43,7 @@ from agents.finetune.samples import Samples, open_samples
 from agents.finetune.settings import FinetuneSettings, Lora
 from agents.finetune.tokens import EncodedChat, Encoder, check_lengths
 from agents.vlm.clients.adapters import adapter_chain, with_adapter
-from agents.vlm.clients.checkpoint import one_line
+from agents.vlm.clients.checkpoint import load_weights, one_line
 from agents.vlm.tuned_model import recorded_pictures
 from er_gym.activity import begin
 
@@ -350,30 +350,20 @@ def _about(chats: list[EncodedChat], samples: Samples) -> str:
 
 def _load(files: ModelFiles, settings: FinetuneSettings, dtype: str) -> Any:
     """The model with its weights; adapters beneath are merged into it."""
-    maker = (
-        transformers.AutoModelForImageTextToText
-        if files.has_vision
-        else transformers.AutoModelForCausalLM
-    )
-    network: Any
-    told: Any
     try:
-        loaded: Any = maker.from_pretrained(
+        network, missing = load_weights(
             files.base,
+            files.config,
             dtype=dtype,
             attn_implementation=settings.model.attention or None,
             local_files_only=True,
-            output_loading_info=True,
         )
-        network, told = loaded  # a pair, for output_loading_info
         for adapter in adapter_chain(files.path)[1]:
             network = with_adapter(network, adapter, merge=True)
     except Exception as error:  # what broken files make of the libraries can be any exception
         raise ValueError(f"{files.path} cannot be loaded: {one_line(error)}") from None
-    if missing := sorted(told["missing_keys"]):
-        raise ValueError(
-            f"{files.base}: {len(missing)} of its weights are missing, such as {missing[0]}"
-        )
+    if missing:
+        raise ValueError(f"{files.base}: {missing}")
     return network
 
 

@@ -24,7 +24,14 @@ from er_gym.writing import write_atomic
 CURVE = "curve.jsonl"
 
 
-class Checkpoints(BaseCallback):
+class BetweenRollouts(BaseCallback):
+    """A callback that does nothing at a single step."""
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class Checkpoints(BetweenRollouts):
     """Saves the model every ``every`` steps, between an update and the next rollout.
 
     Attributes:
@@ -59,9 +66,6 @@ class Checkpoints(BaseCallback):
 
     def _on_rollout_end(self) -> None:
         self.steps = self.num_timesteps
-
-    def _on_step(self) -> bool:
-        return True
 
 
 class CurveWriter(KVWriter):
@@ -216,7 +220,7 @@ class HeldOutEvaluation(MaskableEvalCallback):
             each.update(values)
 
 
-class TorchThreads(BaseCallback):
+class TorchThreads(BetweenRollouts):
     """Gives torch ``threads`` threads for updates and one during rollouts, which need the cores."""
 
     def __init__(self, threads: int) -> None:
@@ -229,11 +233,8 @@ class TorchThreads(BaseCallback):
     def _on_rollout_end(self) -> None:
         torch.set_num_threads(self._threads)
 
-    def _on_step(self) -> bool:
-        return True
 
-
-class Curriculum(BaseCallback):
+class Curriculum(BetweenRollouts):
     """Sets the task types of the current phase in the environments."""
 
     def __init__(self, phases: Sequence[Phase], types: Sequence[str]) -> None:
@@ -250,9 +251,6 @@ class Curriculum(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         self.set_types(self.training_env, self.num_timesteps)
-
-    def _on_step(self) -> bool:
-        return True
 
 
 class SuccessByType(BaseCallback):

@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from agents import configs
+from agents.configs import ConfigKind, StrictSettings, load
 from er_gym.envs.object_selection import EXPLORE
 from er_gym.tasks.types import canonical_names
 
@@ -23,11 +23,7 @@ Positive = Annotated[int, Field(gt=0)]
 Rate = Annotated[float, Field(gt=0)]
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class EnvConfig(_Model):
+class EnvConfig(StrictSettings):
     """The episodes, the observations and the reward.
 
     Attributes:
@@ -72,14 +68,14 @@ class EnvConfig(_Model):
     _types = field_validator("types")(canonical_names)
 
 
-class VecEnvConfig(_Model):
+class VecEnvConfig(StrictSettings):
     """The number of environments and of worker processes."""
 
     envs: Annotated[int, Field(gt=0, le=4096)] = 128
     workers: Annotated[int, Field(gt=0, le=256)] = 2
 
 
-class Evaluation(_Model):
+class Evaluation(StrictSettings):
     """Regular evaluation on held-out scenes.
 
     Attributes:
@@ -93,7 +89,7 @@ class Evaluation(_Model):
     count: Positive = 100
 
 
-class Phase(_Model):
+class Phase(StrictSettings):
     """A phase of a curriculum: the task types until ``until`` steps."""
 
     until: Positive
@@ -102,7 +98,7 @@ class Phase(_Model):
     _types = field_validator("types")(canonical_names)
 
 
-class Practice(_Model):
+class Practice(StrictSettings):
     """Rounds of DAgger after cloning: the policy plays, the searcher says what it would have done,
     and the policy is fitted to all that has been gathered (:mod:`agents.rl.practice`).
 
@@ -117,7 +113,7 @@ class Practice(_Model):
     epochs: Positive = 2
 
 
-class WarmStart(_Model):
+class WarmStart(StrictSettings):
     """Behaviour cloning before reinforcement learning.
 
     Attributes:
@@ -140,7 +136,7 @@ class WarmStart(_Model):
     practice: Practice | None = None
 
 
-class Network(_Model):
+class Network(StrictSettings):
     """The network: the ``width`` of its layers, and the length ``kind`` of an object type's
     embedding."""
 
@@ -148,7 +144,7 @@ class Network(_Model):
     kind: Annotated[int, Field(gt=0, le=8192)] = 16
 
 
-class PPO(_Model):
+class PPO(StrictSettings):
     """MaskablePPO of sb3-contrib, with its parameter names. ``final_learning_rate`` is added: the
     share of the learning rate that remains at the end."""
 
@@ -167,7 +163,7 @@ class PPO(_Model):
     target_kl: Rate | None = None
 
 
-class DQN(_Model):
+class DQN(StrictSettings):
     """DQN, or QR-DQN with ``quantiles``, over legal actions, with Stable-Baselines3's parameter
     names."""
 
@@ -189,7 +185,7 @@ class DQN(_Model):
 Algorithm = Annotated[PPO | DQN, Field(discriminator="name")]
 
 
-class TrainConfig(_Model):
+class TrainConfig(StrictSettings):
     """A training run.
 
     Attributes:
@@ -263,19 +259,8 @@ class TrainConfig(_Model):
         return self
 
 
-def config_names() -> tuple[str, ...]:
-    """The names of er-gym's own training configurations, in alphabetical order."""
-    return configs.names("rl")
-
-
-def config_file(name: str) -> Path:
-    """The file of a training configuration: a path, or the name of one of er-gym's own.
-
-    Raises:
-        ValueError: the file does not exist; the message lists er-gym's own.
-    """
-    return configs.file_of("rl", name, _WHAT)
-
+CONFIGS = ConfigKind(TrainConfig, "rl", _WHAT)
+config_names, config_file = CONFIGS.names, CONFIGS.file
 
 ALGORITHM_NAMES = {
     "ppo": "MaskablePPO",
@@ -312,4 +297,4 @@ def load_config(
         ValueError: an override has no ``=`` or names an unknown field, or a value is invalid.
         TaskFileError: the file cannot be read. (It is a ValueError.)
     """
-    return configs.load(TrainConfig, file, _WHAT, overrides, more)
+    return load(TrainConfig, file, _WHAT, overrides, more)

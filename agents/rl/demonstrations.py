@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
@@ -11,12 +11,17 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from agents import make_agent
 from agents.rl.packed import Column, PackedRows, concatenated, packed
 from agents.rl.policy_observation import Obs
+from agents.scripted.oracle import OracleAgent
+from agents.scripted.searcher import SearcherAgent
 from er_gym.envs.actions import ACTIONS, INDEX, Action, understand
 from er_gym.envs.info import with_details
+from er_gym.rollout.agent import Agent
 from er_gym.rollout.loop import transitions
+
+TEACHERS: Mapping[str, Callable[[], Agent]] = {"searcher": SearcherAgent, "oracle": OracleAgent}
+"""The agents that can be imitated, by name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +58,7 @@ def demonstrate(
 
     Args:
         env: the learner's environment.
-        teacher: the agent's name.
+        teacher: one of :data:`TEACHERS`.
         episodes: the number of episodes.
         gamma: the discount of ``returns``.
         successes_only: whether the steps of failed episodes are left out.
@@ -61,7 +66,7 @@ def demonstrate(
     kept = [_of(env, [], gamma)]
     successes = 0
     for _ in range(episodes):
-        agent = make_agent(teacher)
+        agent = TEACHERS[teacher]()
         obs, told = env.reset()
         last: Mapping[str, Any] = (info := with_details(env, told))
         agent.reset(info["task"], info["seen"], info)

@@ -15,7 +15,7 @@ class PackedRows:
     """N rows of D numbers, of which only those other than 0 are kept.
 
     A hundred thousand observations of object types take gigabytes; packed, they fit beside the
-    environments.
+    environments. SciPy's CSR matrix takes a third more, since its places are of 32 bits.
 
     Attributes:
         values: the numbers other than 0, row after row.

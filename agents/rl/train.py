@@ -25,7 +25,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 from torch.distributions import Distribution
 
 from agents.configs import dump
-from agents.rl import dqn, ppo
+from agents.rl import dqn, policy
 from agents.rl.callbacks import (
     CURVE,
     BoardWriter,
@@ -57,7 +57,7 @@ _EVALUATION_SEED = 10_000
 
 
 ALGORITHMS: Mapping[str, Callable[..., BaseAlgorithm]] = {
-    "ppo": ppo.make,
+    "ppo": policy.make,
     "dqn": dqn.make,
     "qrdqn": dqn.make,
 }

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, Protocol, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias
 
 from er_gym.rollout.agent import CannotFinish, ModelReply
 
@@ -128,6 +128,18 @@ def model_reply(reply: Reply) -> ModelReply:
         cost=reply.cost,
         cached=reply.from_cache,
     )
+
+
+def template_message(role: str, parts: Sequence[object]) -> dict[str, Any]:
+    """A message as the chat templates of transformers take it; a part that is no text is a
+    picture."""
+    if all(isinstance(part, str) for part in parts):
+        return {"role": role, "content": "\n".join(map(str, parts))}
+    blocks = [
+        {"type": "text", "text": part} if isinstance(part, str) else {"type": "image"}
+        for part in parts
+    ]
+    return {"role": role, "content": blocks}
 
 
 class ModelError(Exception):

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from agents.vlm.name_embeddings import NameEmbeddings
-from agents.vlm.names import ENTRIES, MatchMethod, keys_of, look_up
+from agents.vlm.parsing.names import ENTRIES, MatchMethod, keys_of, look_up
 from agents.vlm.settings import Matching
 from er_gym.extras import MissingPackage
 

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit, urlunsplit
 from pydantic import BaseModel, ConfigDict
 
 from agents.vlm.chat import Reply, Role, Usage
-from agents.vlm.clients.redaction import Secrets
+from agents.vlm.redaction import Secrets
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.records import By, GrownRecord
 

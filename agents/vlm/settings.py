@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
+
+from agents.configs import StrictSettings
 
 
 def _no_bool(value: object) -> object:
@@ -35,11 +37,7 @@ Seconds = Annotated[float, BeforeValidator(_no_bool), Field(gt=0, le=86_400)]
 Dollars = Annotated[float, BeforeValidator(_no_bool), Field(ge=0, le=1_000_000)]
 
 
-class _Settings(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Pictures(_Settings):
+class Pictures(StrictSettings):
     """Which pictures are sent, and how.
 
     Attributes:
@@ -92,7 +90,7 @@ class Pictures(_Settings):
         )
 
 
-class Prompts(_Settings):
+class Prompts(StrictSettings):
     """Which prompts the model is given.
 
     Attributes:
@@ -115,7 +113,7 @@ class Prompts(_Settings):
         return self
 
 
-class Sampling(_Settings):
+class Sampling(StrictSettings):
     """Sampling parameters; ``max_tokens`` limits one reply, thoughts included."""
 
     temperature: float = Field(0.0, ge=0)
@@ -123,7 +121,7 @@ class Sampling(_Settings):
     max_tokens: Positive = 1024
 
 
-class Reasoning(_Settings):
+class Reasoning(StrictSettings):
     """How a reasoning model's thoughts are handled.
 
     Attributes:
@@ -136,7 +134,7 @@ class Reasoning(_Settings):
     in_history: bool = False
 
 
-class History(_Settings):
+class History(StrictSettings):
     """What of the conversation is sent again with each turn.
 
     Attributes:
@@ -149,7 +147,7 @@ class History(_Settings):
     trim: bool | None = None
 
 
-class Matching(_Settings):
+class Matching(StrictSettings):
     """How a name that a model writes is matched with an object type.
 
     Attributes:
@@ -164,7 +162,7 @@ class Matching(_Settings):
     threshold: float = Field(0.7, ge=-1, le=1)
 
 
-class Prices(_Settings):
+class Prices(StrictSettings):
     """US dollars per million tokens; ``cached_prompt`` defaults to ``prompt``."""
 
     prompt: Dollars = 0.0
@@ -172,7 +170,7 @@ class Prices(_Settings):
     cached_prompt: Dollars | None = None
 
 
-class Server(_Settings):
+class Server(StrictSettings):
     """The address and limits of an OpenAI-compatible server, or of several with the same model.
 
     Attributes:
@@ -200,7 +198,7 @@ class Server(_Settings):
     tries: Positive = 6
     requests_per_minute: Positive | None = None
     max_tokens_field: Literal["max_tokens", "max_completion_tokens"] = "max_tokens"
-    extra: dict[str, Any] = {}
+    extra: dict[str, Any] = Field(default_factory=dict)
 
     @property
     def base_urls(self) -> tuple[str, ...]:
@@ -209,7 +207,7 @@ class Server(_Settings):
         return given if any(given) else ()
 
 
-class Local(_Settings):
+class Local(StrictSettings):
     """How transformers runs a model in this process, or in Ray actors.
 
     Attributes:
@@ -237,7 +235,7 @@ class Local(_Settings):
     actor_cpus: float = Field(1.0, ge=0)
 
 
-class AgentSettings(_Settings):
+class AgentSettings(StrictSettings):
     """The settings of a model agent.
 
     Attributes:

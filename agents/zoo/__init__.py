@@ -6,7 +6,8 @@ cards, ``er-gym zoo add`` writes such a folder.
 
 * :mod:`agents.zoo.card`: what a card says.
 * :mod:`agents.zoo.index`: finds models by name.
-* :mod:`agents.zoo.packing`: makes a model's folder from a training run.
+
+:mod:`agents.packing` makes a model's folder from a training run.
 
 This file imports nothing, so a name is resolved quickly.
 """

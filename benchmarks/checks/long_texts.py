@@ -158,9 +158,9 @@ def readers() -> Mapping[str, Reader]:
     from agents.vlm.chat import Reply
     from agents.vlm.clients.chat_completions import error_text, read_completion, reply_of
     from agents.vlm.clients.failures import refusal_of
-    from agents.vlm.clients.redaction import Secrets
     from agents.vlm.matching import Matcher
     from agents.vlm.parsing import parse
+    from agents.vlm.redaction import Secrets
     from agents.vlm.settings import Matching
     from agents.vlm.shortcomings import causes_of
     from benchmarks.monitor.formats import brief, visible

@@ -27,10 +27,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from agents.factory import AgentFactory
 from agents.vlm.chat import Message, ModelError, Picture, Reply
 from agents.vlm.clients.budget import Budget
 from agents.vlm.clients.supervisor import ServerEvent
-from agents.vlm.factory import AgentFactory
 from agents.vlm.settings import AgentSettings
 from benchmarks.checks.faulty_server import CASES, KEY, Case
 from benchmarks.harness import processes

@@ -342,7 +342,7 @@ def _env_kwargs(suite: Suite, options: BenchOptions, vlm_run: VLMRun | None) -> 
 
 def _vlm_run(agent: str, vlm_options: VLMOptions) -> VLMRun | None:
     """The run of a vision-language agent; None for other agents, which take none of its options."""
-    from agents.vlm.factory import is_model_agent
+    from agents.factory import is_model_agent
 
     if is_model_agent(agent):
         return vlm_options.run(agent)

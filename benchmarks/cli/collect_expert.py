@@ -106,7 +106,7 @@ class ExpertRun:
     def stated(self) -> dict[str, Any]:
         """What the collection's manifest states of it; no secrets."""
         from agents.expert.writers.prompts import load_writer_prompts
-        from agents.vlm.factory import comparable_settings
+        from agents.factory import comparable_settings
 
         own = load_writer_prompts(self.language, self._profile).digest
         options = self.options

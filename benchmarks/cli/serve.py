@@ -87,8 +87,8 @@ def serve(model: str, more: tuple[str, ...], server_options: ServerOptions) -> i
     transformers does. An adapter is first merged into its model, once, in the directory merged
     beside it. The server listens on 127.0.0.1 only, and ends when this command does.
     """
-    from agents.vlm.factory import load_settings
-    from agents.vlm.merging import merge, merged_directory
+    from agents.factory import load_settings
+    from agents.vlm.clients.merging import merge, merged_directory
     from agents.vlm.serving import ServeOptions, command_for, inspect_machine
     from agents.vlm.tuned_model import agent_file, model_directory
 
@@ -130,7 +130,7 @@ def match_server(port: int, agent_config: str | None, overrides: tuple[str, ...]
 
     The server matches as an agent with these settings does. It listens on 127.0.0.1 only.
     """
-    from agents.vlm.factory import load_settings
+    from agents.factory import load_settings
     from agents.vlm.match_server import serve as serve_matches
     from agents.vlm.matching import Matcher
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 FORMATS = ("table", "md")
 DTYPES = ("float16", "bfloat16", "float32")
-"""As in ``agents.zoo.packing``, which imports torch; a test compares."""
+"""As in ``agents.packing``, which imports torch; a test compares."""
 _NAME = re.compile(r"[a-z0-9]+([.-][a-z0-9]+)*")
 _NONE = "-"
 
@@ -124,7 +124,7 @@ def add(
             "single-search"
         )
     with needing("packing a model", "er-gym[rl,local]"):
-        from agents.zoo import packing
+        from agents import packing
     from agents.zoo.card import Card, card_text
     from agents.zoo.index import CARD
     from agents.zoo.index import FOLDER as MODELS

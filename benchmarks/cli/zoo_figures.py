@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from agents.vlm.factory import comparable_settings, load_settings
+from agents.factory import comparable_settings, load_settings
 from agents.vlm.prompts import prompts_for
 from agents.vlm.tuned_model import AGENT
 from agents.zoo.card import Figure, Rate

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from agents.vlm.factory import load_settings
+from agents.factory import load_settings
 from agents.vlm.tuned_model import agent_file
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import EXISTING_FOLDER

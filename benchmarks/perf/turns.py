@@ -19,9 +19,9 @@ from pathlib import Path
 import click
 import numpy as np
 
+from agents.factory import load_settings, settings_file
 from agents.vlm.chat import Message, Picture
 from agents.vlm.clients.local import LocalClient
-from agents.vlm.factory import load_settings, settings_file
 from agents.vlm.pictures import encode
 from agents.vlm.settings import AgentSettings
 from benchmarks.cli.options import agent_config_option, overrides_option

@@ -15,10 +15,10 @@ from typing import Any
 
 from agents import make_agent
 from agents.expert.recipe import load_recipe
+from agents.factory import is_model_agent
+from agents.factory import load_settings as load_agent_settings
 from agents.finetune.architecture import load_architecture
 from agents.finetune.settings import load_settings as load_finetune_settings
-from agents.vlm.factory import is_model_agent
-from agents.vlm.factory import load_settings as load_agent_settings
 from benchmarks.study.settings import Collected, PlaySettings
 from er_gym.data.dialects import load_dialect
 from er_gym.envs.embodied_env import EmbodiedEnv

@@ -2,7 +2,8 @@
 
 The file is a list of objects, or objects one after another (JSON Lines, on one line each or not).
 Other values among them are items, too, so that it can be said which are wrong. The file is mapped
-into memory, not read: what is kept are two numbers for each item.
+into memory, not read: what is kept are two numbers for each item. (ijson reads faster from
+beginning to end, but does not say where an item is, and stops at the first that is not JSON.)
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 In ``concurrent.futures``, a killed process loses all running jobs, and nothing says which job was
 at fault. Here each worker has a pipe of its own and holds one job at a time. The pool thus knows
-the job, tries it again, and leaves the other jobs alone.
+the job, tries it again, and leaves the other jobs alone. (Pebble's pool knows the job, too, but
+neither tries it again nor starts its processes by :mod:`er_gym.rollout.processes`.)
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ import pytest
 import yaml
 from click.testing import CliRunner
 
-from agents.finetune.drawing import drawn
+from agents.finetune.samples import drawn
 from agents.finetune.settings import load_settings
 from benchmarks.cli.main import cli
 from benchmarks.pages.models import main as models_page

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from agents.expert.writers.prompts import load_writer_prompts
-from agents.vlm.factory import load_settings
+from agents.factory import load_settings
 from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import Prompts
 from er_gym.data.dialects import dialect_names, load_dialect

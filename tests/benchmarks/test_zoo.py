@@ -230,9 +230,9 @@ def test_a_language_model_takes_over_the_settings_that_it_was_measured_with(
     er_gym: Command, models: Path, tmp_path: Path
 ) -> None:
     pytest.importorskip("transformers", reason="needs the extra local")
+    from agents.factory import load_settings
     from agents.finetune.architecture import load_architecture
     from agents.finetune.new_model import make_model
-    from agents.vlm.factory import load_settings
 
     tiny = ["vocabulary=256", "text.hidden_size=32", "text.num_hidden_layers=1"]
     made = make_model(load_architecture("tiny-text", tiny), (), tmp_path / "model")

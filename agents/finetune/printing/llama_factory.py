@@ -6,21 +6,19 @@ and ``mask_history`` trains on the last turn of each.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
-
-import yaml
 
 from agents.finetune.printing.plan import (
     DATA,
     OUTPUT,
-    ZERO3_FILE,
     Printed,
     PrintPlan,
     Program,
+    of_lora,
     of_transformers,
-    zero3,
+    yaml_text,
+    zero3_text,
 )
 from agents.finetune.printing.sources import SourceJob
 from er_gym.data.exports.sharegpt import SHAREGPT
@@ -46,14 +44,10 @@ def arguments(plan: PrintPlan) -> dict[str, Any]:
         "freeze_language_model": False,
         "disable_gradient_checkpointing": not training.checkpointing,
     }
+    found |= of_lora(plan, "lora_rank", "lora_alpha", "lora_dropout", "lora_target")
     if model.lora is not None:
         targets = model.lora.targets
-        found |= {
-            "lora_rank": model.lora.rank,
-            "lora_alpha": model.lora.alpha,
-            "lora_dropout": model.lora.dropout,
-            "lora_target": "all" if isinstance(targets, str) else ",".join(targets),
-        }
+        found["lora_target"] = "all" if isinstance(targets, str) else ",".join(targets)
     if plan.facts.feedback:
         found |= {
             "new_special_tokens_config": f"{DATA}/special_tokens.yaml",
@@ -96,13 +90,11 @@ def _merge(plan: PrintPlan) -> dict[str, Any]:
 def _write(plan: PrintPlan, folder: Path) -> Printed:
     job = SourceJob.of(plan.source, folder / DATA, per_turn=plan.facts.partly, copy=plan.copy)
     SHAREGPT.write(job)
-    texts = {_TRAIN: _yaml(arguments(plan))}
+    texts = {_TRAIN: yaml_text(arguments(plan)), **zero3_text(plan)}
     notes = [
         "LLaMA-Factory cuts a conversation that is longer than `cutoff_len`, pictures included, "
         "without an error: do not lower it below the length of the longest.",
     ]
-    if plan.sharded:
-        texts[ZERO3_FILE] = json.dumps(zero3(plan), indent=2) + "\n"
     if plan.facts.partly:
         notes.append(
             "Some turns are not to be learnt. LLaMA-Factory has no flag for a turn, so every "
@@ -124,7 +116,7 @@ def _write(plan: PrintPlan, folder: Path) -> Printed:
             )
         )
     if plan.settings.model.lora is not None:
-        texts[_MERGE] = _yaml(_merge(plan))
+        texts[_MERGE] = yaml_text(_merge(plan))
         notes.append(
             f"`llamafactory-cli export {_MERGE}` merges the adapter into the model, for serving or "
             "as the base of the next stage."
@@ -136,10 +128,6 @@ def _write(plan: PrintPlan, folder: Path) -> Printed:
         notes=tuple(notes),
         made_with="LLaMA-Factory 0.9.5",
     )
-
-
-def _yaml(values: dict[str, Any]) -> str:
-    return yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
 
 
 LLAMA_FACTORY = Program(NAME, _write)

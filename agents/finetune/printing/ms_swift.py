@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from agents.finetune.printing.plan import (
     DATA,
-    ZERO3_FILE,
     Printed,
     PrintPlan,
     Program,
+    of_lora,
     of_transformers,
-    zero3,
+    yaml_text,
+    zero3_text,
 )
 from agents.finetune.printing.sources import SourceJob
 from er_gym.data.exports.ms_swift import MS_SWIFT as EXPORT
@@ -51,14 +49,7 @@ def arguments(plan: PrintPlan) -> dict[str, Any]:
     }
     if model.attention:
         found["attn_impl"] = model.attention
-    if model.lora is not None:
-        targets = model.lora.targets
-        found |= {
-            "lora_rank": model.lora.rank,
-            "lora_alpha": model.lora.alpha,
-            "lora_dropout": model.lora.dropout,
-            "target_modules": [targets] if isinstance(targets, str) else list(targets),
-        }
+    found |= of_lora(plan, "lora_rank", "lora_alpha", "lora_dropout", "target_modules")
     if plan.facts.feedback:
         found["new_special_tokens"] = [FEEDBACK_TOKEN]
         if model.lora is not None:
@@ -83,12 +74,10 @@ def arguments(plan: PrintPlan) -> dict[str, Any]:
 
 def _write(plan: PrintPlan, folder: Path) -> Printed:
     EXPORT.write(SourceJob.of(plan.source, folder / DATA, per_turn=False, copy=plan.copy))
-    texts = {_TRAIN: yaml.safe_dump(arguments(plan), sort_keys=False, allow_unicode=True)}
+    texts = {_TRAIN: yaml_text(arguments(plan)), **zero3_text(plan)}
     notes = [
         "`loss` in a message says whether a turn of the assistant is learnt; ms-swift heeds it."
     ]
-    if plan.sharded:
-        texts[ZERO3_FILE] = json.dumps(zero3(plan), indent=2) + "\n"
     if plan.facts.feedback:
         notes.append(
             f"`<|feedback|>` becomes the token {plan.model.facts.feedback_id}, for which the "

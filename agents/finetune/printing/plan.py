@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import yaml
 
 from agents.finetune.models import ChosenModel
 from agents.finetune.printing.sources import Facts, Source
@@ -102,6 +105,25 @@ def of_transformers(plan: PrintPlan) -> dict[str, Any]:
         "dataloader_num_workers": 4,
         **({"deepspeed": ZERO3_FILE} if plan.sharded else {}),
     }
+
+
+def of_lora(plan: PrintPlan, rank: str, alpha: str, dropout: str, targets: str) -> dict[str, Any]:
+    """The arguments of the adapter, by the names that a program has for them; none without one."""
+    lora = plan.settings.model.lora
+    if lora is None:
+        return {}
+    named = [lora.targets] if isinstance(lora.targets, str) else list(lora.targets)
+    return {rank: lora.rank, alpha: lora.alpha, dropout: lora.dropout, targets: named}
+
+
+def yaml_text(arguments: Mapping[str, Any]) -> str:
+    """Arguments as YAML, in their order."""
+    return yaml.safe_dump(arguments, sort_keys=False, allow_unicode=True)
+
+
+def zero3_text(plan: PrintPlan) -> dict[str, str]:
+    """The file for ZeRO-3 and its content; none for a run that is not divided among GPUs."""
+    return {ZERO3_FILE: json.dumps(zero3(plan), indent=2) + "\n"} if plan.sharded else {}
 
 
 def zero3(plan: PrintPlan) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import er_gym
-from agents.finetune.drawing import drawn
+from agents.finetune.samples import drawn
 from agents.finetune.settings import DataSettings, Mask
 from er_gym.data.chat import Chat
 from er_gym.data.collection import MANIFEST, Collection, CollectionManifest

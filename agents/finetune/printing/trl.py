@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from agents.finetune.printing.plan import (
     DATA,
-    ZERO3_FILE,
     Printed,
     PrintPlan,
     Program,
+    of_lora,
     of_transformers,
-    zero3,
+    yaml_text,
+    zero3_text,
 )
 from agents.finetune.printing.sources import SourceJob
 from er_gym.data.exports.sharegpt import FEEDBACK_TOKEN
@@ -42,14 +40,7 @@ def arguments(plan: PrintPlan) -> dict[str, Any]:
     }
     if model.attention:
         found["attn_implementation"] = model.attention
-    if model.lora is not None:
-        targets = model.lora.targets
-        found |= {
-            "lora_r": model.lora.rank,
-            "lora_alpha": model.lora.alpha,
-            "lora_dropout": model.lora.dropout,
-            "lora_target_modules": [targets] if isinstance(targets, str) else list(targets),
-        }
+    found |= of_lora(plan, "lora_r", "lora_alpha", "lora_dropout", "lora_target_modules")
     found |= {
         "max_length": None,  # to cut a conversation would cut pictures
         "remove_unused_columns": False,  # the collator needs the column "train"
@@ -67,11 +58,10 @@ def arguments(plan: PrintPlan) -> dict[str, Any]:
 def _write(plan: PrintPlan, folder: Path) -> Printed:
     EXPORT.write(SourceJob.of(plan.source, folder / DATA, per_turn=False, copy=plan.copy))
     texts = {
-        _CONFIG: yaml.safe_dump(arguments(plan), sort_keys=False, allow_unicode=True),
+        _CONFIG: yaml_text(arguments(plan)),
         _SCRIPT: _SOURCE.read_text(encoding="utf-8"),
+        **zero3_text(plan),
     }
-    if plan.sharded:
-        texts[ZERO3_FILE] = json.dumps(zero3(plan), indent=2) + "\n"
     return Printed(
         texts=texts,
         command=(*_LAUNCH, str(plan.gpus), _SCRIPT, "--config", _CONFIG),

@@ -1,7 +1,8 @@
-"""Batches jobs from many threads and runs each batch in one thread.
+"""Does jobs from many threads in one thread, some of them together.
 
 A model takes hardly longer for eight conversations than for one, and only one thread at a time can
-use it.
+use it. A job may take many steps; then others begin and end at any of them. Jobs that are done in
+whole batches are jobs of one step.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import contextlib
 import queue
 import threading
 import time
-from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, InvalidStateError
 from dataclasses import dataclass, field
@@ -20,6 +21,7 @@ from agents.vlm.chat import ModelError
 from er_gym.rollout.agent import CannotGoOn
 
 Job = TypeVar("Job")
+State = TypeVar("State")
 Result = TypeVar("Result")
 
 
@@ -57,16 +59,39 @@ class Failure:
 CLOSED = Failure(CannotGoOn, "the model has been closed")
 
 
-class JobThread(ABC, Generic[Job, Result]):
-    """Does jobs from many threads in a thread of its own, which starts in ``__init__``: a subclass
-    sets its own attributes before.
+class SteppedJobs(Generic[Job, State, Result]):
+    """Does jobs of many steps from many threads in a thread of its own.
+
+    If a step fails, its jobs begin anew one by one, so that only the faulty ones fail. If a step
+    does not fit into memory, its jobs begin anew, and from then on half as many are done together.
+
+    Args:
+        begin: makes the state of a job.
+        step: goes one step further with some jobs. It raises MemoryError if there are too many,
+            CannotGoOn if no job can succeed any more, and any other exception if a job is faulty.
+            It is always called from the same thread.
+        result: the result of a job from its state; None while it is not done.
+        size: the most jobs at once.
+        wait: seconds that a job waits for others before its first step, if no job has begun.
 
     Attributes:
         waiting: the jobs that nobody has taken yet; None wakes the thread.
         closed: whether :meth:`close` has been called.
     """
 
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        begin: Callable[[Job], State],
+        step: Callable[[Sequence[State]], None],
+        result: Callable[[State], Result | None],
+        size: int,
+        wait: float = 0.0,
+    ) -> None:
+        self._begin, self._step, self._result = begin, step, result
+        self._size, self._wait = size, wait
+        self._running: list[tuple[Asked[Job, Result], State]] = []
+        self._again: deque[Asked[Job, Result]] = deque()
+        self._alone: deque[Asked[Job, Result]] = deque()
         self.waiting: queue.SimpleQueue[Asked[Job, Result] | None] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self.closed = False
@@ -93,98 +118,131 @@ class JobThread(ABC, Generic[Job, Result]):
             raise
 
     def close(self) -> None:
-        """End the thread once the jobs at hand allow it; waiting callers get CannotGoOn."""
+        """End the thread after the step at hand; waiting callers get CannotGoOn."""
         with self._lock:
             self.closed = True
             self.waiting.put(None)  # wakes the thread
         self._thread.join()
 
-    @abstractmethod
-    def work(self) -> None:
-        """Wait for jobs and do some. It is called in the thread again and again until closed."""
-
-    @abstractmethod
-    def unanswered(self) -> Sequence[Asked[Job, Result]]:
-        """The jobs that have been taken from the queue and may have no answer yet."""
+    # -- in the thread of the jobs -----------------------------------------------------------------
 
     def _serve(self) -> None:
         try:
             while not self.closed:
-                self.work()
-        finally:  # closed, or work raised a BaseException: no caller may wait for ever
+                self._work()
+        finally:  # closed, or a job raised a BaseException: no caller may wait for ever
             with self._lock:
                 self.closed = True
-            for each in self.unanswered():
+            for each in (*(asked for asked, _ in self._running), *self._again, *self._alone):
                 CLOSED.tell(each)
             while not self.waiting.empty():
                 if (left := self.waiting.get()) is not None:
                     CLOSED.tell(left)
 
+    def _work(self) -> None:
+        """Take new jobs in, and go one step further with all."""
+        if self._alone:
+            self._do_alone(self._alone[0])
+            self._alone.popleft()
+            return
+        self._take_in()
+        if not self._running or self.closed:
+            return
+        try:
+            self._step([state for _, state in self._running])
+            results = [self._result(state) for _, state in self._running]
+        except Exception as error:
+            self._failed(Failure.of(error))
+            return
+        going_on = []
+        for (asked, state), result in zip(self._running, results, strict=True):
+            if result is None:
+                going_on.append((asked, state))
+            else:
+                asked.answer.set_result(result)
+        self._running = going_on
 
-class Batcher(JobThread[Job, Result]):
-    """Runs jobs from many threads in batches, in one thread of its own.
+    def _take_in(self) -> None:
+        """Begin jobs until there are enough; waits for one if there is none, and then for more."""
+        wait = 0.0 if self._running else self._wait
+        until = 0.0
+        while len(self._running) < self._size:
+            asked = self._next(until)
+            if asked is None:
+                return
+            until = until or time.monotonic() + wait
+            try:
+                self._running.append((asked, self._begin(asked.job)))
+            except Exception as error:
+                Failure.of(error).tell(asked)
 
-    If a batch fails, its jobs are run one by one, so that only the faulty jobs fail. If a batch
-    does not fit into memory, it is halved, and no larger batch is tried afterwards.
+    def _next(self, until: float) -> Asked[Job, Result] | None:
+        """The next job, for which it waits until then (monotonic seconds) or, where none runs, for
+        ever; None if there is none, or once it is closed."""
+        if self._again:
+            return self._again.popleft()
+        while True:
+            left = max(0.0, until - time.monotonic()) if self._running else None
+            try:
+                asked = self.waiting.get(timeout=left)
+            except queue.Empty:
+                return None
+            if asked is None or asked.answer.set_running_or_notify_cancel():
+                return asked
+
+    def _failed(self, failure: Failure) -> None:
+        """Begin the running jobs anew, or end them."""
+        jobs = [asked for asked, _ in self._running]
+        self._running = []
+        if len(jobs) == 1 or issubclass(failure.kind, CannotGoOn):
+            for asked in jobs:
+                failure.tell(asked)
+        elif issubclass(failure.kind, MemoryError):
+            self._size = len(jobs) // 2
+            self._again.extend(jobs)
+        else:
+            self._alone.extend(jobs)
+
+    def _do_alone(self, asked: Asked[Job, Result]) -> None:
+        try:
+            state = self._begin(asked.job)
+            while (result := self._result(state)) is None:
+                if self.closed:
+                    return
+                self._step([state])
+        except Exception as error:
+            Failure.of(error).tell(asked)
+        else:
+            asked.answer.set_result(result)
+
+
+@dataclass
+class OneStep(Generic[Job, Result]):
+    """The state of a job that one step does.
+
+    Attributes:
+        job: the job.
+        result: its result; None before the step.
+    """
+
+    job: Job
+    result: Result | None = None
+
+
+def batches(
+    run: Callable[[Sequence[Job]], Sequence[Result]], size: int, wait: float
+) -> SteppedJobs[Job, OneStep[Job, Result], Result]:
+    """Jobs that are done in whole batches, each in one step.
 
     Args:
-        run: runs some jobs together and returns their results in order. It raises MemoryError if
-            there are too many jobs, CannotGoOn if no job can succeed any more, and any other
-            exception if a job is faulty. It is always called from the same thread.
+        run: does some jobs together and returns their results in order; it raises what a step does.
         size: the largest batch.
         wait: seconds that a job waits for others.
     """
 
-    def __init__(
-        self, run: Callable[[Sequence[Job]], Sequence[Result]], size: int, wait: float
-    ) -> None:
-        self._run, self._size, self._wait = run, size, wait
-        self._batch: Sequence[Asked[Job, Result]] = ()
-        super().__init__()
+    def step(states: Sequence[OneStep[Job, Result]]) -> None:
+        results = run([each.job for each in states])
+        for state, result in list(zip(states, results, strict=True)):
+            state.result = result
 
-    def unanswered(self) -> Sequence[Asked[Job, Result]]:
-        """The batch at hand."""
-        return self._batch
-
-    def work(self) -> None:
-        """Run a batch."""
-        self._batch = self._gathered()
-        self._answer([each for each in self._batch if each.answer.set_running_or_notify_cancel()])
-
-    def _gathered(self) -> list[Asked[Job, Result]]:
-        """The next batch, once there is one; fewer jobs, or none, once it is closed."""
-        batch = [self.waiting.get()]
-        until = time.monotonic() + self._wait
-        while batch[-1] is not None and len(batch) < self._size:
-            try:
-                batch.append(self.waiting.get(timeout=max(0.0, until - time.monotonic())))
-            except queue.Empty:
-                break
-        return [each for each in batch if each is not None]
-
-    def _answer(self, batch: Sequence[Asked[Job, Result]]) -> None:
-        if not batch:
-            return
-        failure = CLOSED if self.closed else self._tried(batch)
-        if failure is None:
-            return
-        if len(batch) == 1 or issubclass(failure.kind, CannotGoOn):
-            for each in batch:
-                failure.tell(each)
-        elif issubclass(failure.kind, MemoryError):
-            self._size = len(batch) // 2
-            while batch:  # in parts that may become still smaller on the way
-                part, batch = batch[: self._size], batch[self._size :]
-                self._answer(part)
-        else:
-            for each in batch:
-                self._answer([each])
-
-    def _tried(self, batch: Sequence[Asked[Job, Result]]) -> Failure | None:
-        try:
-            results = self._run([each.job for each in batch])
-            for each, result in list(zip(batch, results, strict=True)):
-                each.answer.set_result(result)
-        except Exception as error:
-            return Failure.of(error)
-        return None
+    return SteppedJobs(OneStep, step, lambda state: state.result, size, wait)

@@ -14,7 +14,7 @@ import transformers
 from transformers.processing_utils import ProcessorMixin
 
 from agents.vlm.clients.adapters import ADAPTER, adapter_chain, with_adapter
-from agents.vlm.settings import AgentSettings, Local
+from agents.vlm.settings import AgentSettings
 from agents.vlm.tuned_model import model_directory
 from er_gym.activity import begin
 from er_gym.extras import MissingPackage
@@ -94,7 +94,16 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
             f"({type(image_processor).__name__}); run it on a server"
         )
     with _errors_in_one_line(f"{path} cannot be loaded"):
-        model = _model(base, has_vision, local, where)
+        model, missing = load_weights(
+            base,
+            config,
+            dtype=local.dtype,
+            device_map=local.device_map,
+            attn_implementation=local.attention or None,
+            **where,
+        )
+        if missing:
+            raise ValueError(missing)
     ends, pad = _end_tokens(model, tokenizer), tokenizer.pad_token_id
     model.generation_config = transformers.GenerationConfig(
         do_sample=False,
@@ -125,24 +134,28 @@ def one_line(error: Exception) -> str:
     return f"{type(error).__name__}: {' '.join(str(error).split())}"[:_LONGEST_WORDS]
 
 
-def _model(path: str, has_vision: bool, local: Local, where: dict[str, bool]) -> Any:
-    maker = (
-        transformers.AutoModelForImageTextToText
-        if has_vision
-        else transformers.AutoModelForCausalLM
-    )
-    loaded: Any = maker.from_pretrained(
-        path,
-        dtype=local.dtype,
-        device_map=local.device_map,
-        attn_implementation=local.attention or None,
-        output_loading_info=True,
-        **where,
-    )
-    model, found = loaded  # a pair, for output_loading_info
-    if missing := sorted(found["missing_keys"]):  # transformers would fill them with random values
-        raise ValueError(f"{len(missing)} of its weights are missing, such as {missing[0]}")
-    return model
+def load_weights(path: str | Path, config: Any, **options: Any) -> tuple[Any, str]:
+    """A model with its weights.
+
+    Args:
+        path: as ``from_pretrained`` takes it.
+        config: the model's; one with vision is loaded with it.
+        options: further arguments of ``from_pretrained``.
+
+    Returns:
+        the model; and which weights are missing, which transformers fills with random values, in
+        words: "" for none.
+
+    Raises:
+        Exception: of any kind, if the files are broken.
+    """
+    maker: Any = transformers.AutoModelForCausalLM
+    if getattr(config, "vision_config", None) is not None:
+        maker = transformers.AutoModelForImageTextToText
+    model, found = maker.from_pretrained(path, output_loading_info=True, **options)
+    missing = sorted(found["missing_keys"])
+    told = f"{len(missing)} of its weights are missing, such as {missing[0]}" if missing else ""
+    return model, told
 
 
 def _end_tokens(model: Any, tokenizer: Any) -> frozenset[int]:

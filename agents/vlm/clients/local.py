@@ -21,8 +21,15 @@ import jinja2
 import torch
 from transformers import DynamicCache
 
-from agents.vlm.chat import ConversationRefused, Message, Picture, Reply, Usage
-from agents.vlm.clients.batching import CLOSED, Batcher, JobThread
+from agents.vlm.chat import (
+    ConversationRefused,
+    Message,
+    Picture,
+    Reply,
+    Usage,
+    template_message,
+)
+from agents.vlm.clients.batching import CLOSED, SteppedJobs, batches
 from agents.vlm.clients.checkpoint import load, one_line
 from agents.vlm.clients.kept_turns import (
     KeptConversations,
@@ -34,7 +41,6 @@ from agents.vlm.clients.kept_turns import (
 from agents.vlm.clients.packed_rows import PackedModel, PackedRow, can_be_packed
 from agents.vlm.clients.padded_batch import EncodedPrompt, PaddedBatch
 from agents.vlm.clients.seeded_sampling import SeededSampling
-from agents.vlm.clients.stepped_jobs import SteppedJobs
 from agents.vlm.clients.supervisor import AGAIN, RequestSupervisor
 from agents.vlm.settings import AgentSettings
 from er_gym.data.pictures import open_picture
@@ -104,14 +110,14 @@ class LocalClient:
         memory = memory_for(self._model) if local.reuse else 0
         self._kept = KeptConversations(memory) if memory else None
         self._packed: PackedModel | None = None
-        self._jobs: JobThread[EncodedPrompt, Reply]
+        self._jobs: SteppedJobs[EncodedPrompt, Any, Reply]
         if self._kept is not None and can_be_packed(self._model):
             self._packed = PackedModel(
                 self._model, self._image_token if loaded.image_processor else None
             )
             self._jobs = SteppedJobs(self._begun, self._next_tokens, self._ended, local.batch)
         else:
-            self._jobs = Batcher(self._replies, local.batch, local.wait)
+            self._jobs = batches(self._replies, local.batch, local.wait)
 
     def reply(self, messages: Sequence[Message], seed: int) -> Reply:
         """The model's next turn.
@@ -207,9 +213,7 @@ class LocalClient:
             # In the text: templates differ in how they take thoughts separately, and most do not
             # take them at all. Templates that drop earlier thoughts find them here too.
             parts.insert(0, f"{_THINK}\n{message.reasoning}\n{_THOUGHT}\n")
-        if any(isinstance(part, Picture) for part in parts):
-            return {"role": message.role, "content": [_part(part) for part in parts]}
-        return {"role": message.role, "content": "\n".join(map(str, parts))}
+        return template_message(message.role, parts)
 
     def _patches(self, pictures: Sequence[Picture]) -> tuple[torch.Tensor, torch.Tensor]:
         if self._image_processor is None:
@@ -411,10 +415,6 @@ def _grids_by_digest(kept: KeptTurns | None) -> dict[str, torch.Tensor]:
     if kept is None or kept.grids is None:
         return {}
     return dict(zip(kept.pictures, kept.grids.split(1), strict=True))
-
-
-def _part(part: str | Picture) -> dict[str, str]:
-    return {"type": "text", "text": part} if isinstance(part, str) else {"type": "image"}
 
 
 def _without_thought(text: str, thinking: bool) -> tuple[str, str]:

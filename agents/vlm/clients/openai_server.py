@@ -31,9 +31,9 @@ from agents.vlm.clients.decision_schema import REQUEST_FIELDS
 from agents.vlm.clients.endpoint import OPENAI_URL, Endpoint, addresses
 from agents.vlm.clients.endpoints import Endpoints, Use
 from agents.vlm.clients.failures import Failure, failure_of
-from agents.vlm.clients.redaction import RedactingLogFilter, Secrets
 from agents.vlm.clients.supervisor import AGAIN, Request, RequestSupervisor, duration
 from agents.vlm.clients.tokens import RequestSize
+from agents.vlm.redaction import RedactingLogFilter, Secrets
 from agents.vlm.settings import AgentSettings, Server
 from er_gym.rollout.agent import CannotGoOn
 

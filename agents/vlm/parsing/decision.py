@@ -7,9 +7,8 @@ import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from agents.vlm.names import look_up
 from agents.vlm.parsing.json_objects import JsonObject, fields_in, objects_in
-from agents.vlm.parsing.names import clean_name
+from agents.vlm.parsing.names import clean_name, look_up
 from agents.vlm.parsing.placing import receptacle_in
 from agents.vlm.parsing.rules import RULES
 from agents.vlm.parsing.vocabulary import (

@@ -12,8 +12,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from agents.vlm.names import look_up
-from agents.vlm.parsing.names import clean_name
+from agents.vlm.parsing.names import clean_name, look_up
 from agents.vlm.parsing.vocabulary import EDGES, VERBS
 from er_gym.thor import OBJECT_TYPES
 

@@ -12,7 +12,7 @@ from benchmarks.harness.output import ROOT
 
 
 def _settings(text: str, folder: Path) -> None:
-    from agents.vlm.factory import load_settings
+    from agents.factory import load_settings
 
     file = folder / "settings.yaml"
     file.write_text(text, encoding="utf-8")

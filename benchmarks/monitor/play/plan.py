@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from agents import RL_PREFIX, NamedAgent, make_agent
+from agents.factory import is_model_agent
 from agents.vlm.clients.registry import CLIENTS
-from agents.vlm.factory import is_model_agent
 from agents.vlm.settings import Pictures
 from agents.zoo.index import PREFIX as ZOO_PREFIX
 from benchmarks.monitor.play.person import HUMAN, person_agent

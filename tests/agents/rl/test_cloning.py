@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import agents.rl.demonstrations
 from agents import make_agent
 from agents.rl.cloning import clone_behaviour, collect_demonstrations
 from agents.rl.config import TrainConfig, WarmStart
-from agents.rl.demonstrations import Demonstrations, demonstrate
+from agents.rl.demonstrations import TEACHERS, Demonstrations, demonstrate
 from agents.rl.envs import make_env
 from agents.rl.train import ALGORITHMS, make_vec_env, train
 from er_gym.envs.actions import INDEX, Action
@@ -116,7 +115,7 @@ def recited(make_config: Make, monkeypatch: pytest.MonkeyPatch) -> Recited:
     """A function to the demonstrations of an agent that recites texts in each episode."""
 
     def play(texts: Sequence[str], episodes: int, only_successes: bool = False) -> Demonstrations:
-        monkeypatch.setattr(agents.rl.demonstrations, "make_agent", lambda _: Reciter(*texts))
+        monkeypatch.setitem(TEACHERS, "reciter", lambda: Reciter(*texts))
         settings = {"episodes": "mini", "types": ["single_toggle"], "illegal_penalty": 0.5}
         env = make_env(make_config(env=settings).env, with_text=True)
         env.reset(seed=0)

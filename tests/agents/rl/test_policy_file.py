@@ -16,9 +16,8 @@ import torch
 from safetensors.torch import load_file, save_file
 from untrained_policy import write_untrained_run
 
-from agents.rl.agent import RLAgent
+from agents.rl.agent import GreedyPolicy, RLAgent
 from agents.rl.config import TrainConfig
-from agents.rl.greedy import GreedyPolicy
 from agents.rl.policy_file import (
     ABOUT,
     CONFIG,

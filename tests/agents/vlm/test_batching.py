@@ -12,11 +12,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import pytest
 
 from agents.vlm.chat import ModelError
-from agents.vlm.clients.batching import Batcher
+from agents.vlm.clients.batching import OneStep, SteppedJobs, batches
 from er_gym.rollout.agent import CannotGoOn
 
 LONG = 60.0  # seconds; only broken code waits so long
 Outcome = str | type[Exception]
+Batches = SteppedJobs[str, OneStep[str, str], str]
 
 
 class Model:
@@ -44,9 +45,7 @@ def pool() -> Iterator[ThreadPoolExecutor]:
         yield made
 
 
-def asked(
-    pool: ThreadPoolExecutor, batcher: Batcher[str, str], jobs: Sequence[str]
-) -> list[str | Exception]:
+def asked(pool: ThreadPoolExecutor, batcher: Batches, jobs: Sequence[str]) -> list[str | Exception]:
     """What becomes of jobs, each asked for by a thread of its own, all at once."""
     answers = [pool.submit(batcher.do, job) for job in jobs]
     return [each.exception(LONG) or each.result() for each in answers]  # type: ignore[misc]
@@ -54,7 +53,7 @@ def asked(
 
 def test_those_who_wait_are_served_together(pool: ThreadPoolExecutor) -> None:
     model = Model()
-    batcher = Batcher(model, size=4, wait=LONG)  # a full batch goes at once
+    batcher = batches(model, size=4, wait=LONG)  # a full batch goes at once
     for _ in range(3):
         assert asked(pool, batcher, ["ab", "cd", "ef", "gh"]) == ["ba", "dc", "fe", "hg"]
     batcher.close()
@@ -64,7 +63,7 @@ def test_those_who_wait_are_served_together(pool: ThreadPoolExecutor) -> None:
 
 
 def test_nobody_waits_for_others_longer_than_allowed() -> None:
-    batcher = Batcher(Model(), size=4, wait=0.0)
+    batcher = batches(Model(), size=4, wait=0.0)
     assert batcher.do("ab") == "ba"
     batcher.close()
 
@@ -75,7 +74,7 @@ def test_only_who_is_at_fault_fails(pool: ThreadPoolExecutor) -> None:
             raise ValueError("no\nsuch job")
 
     model = Model(check)
-    batcher = Batcher(model, size=4, wait=LONG)
+    batcher = batches(model, size=4, wait=LONG)
     first, bad, *others = asked(pool, batcher, ["ab", "bad", "cd", "ef"])
     batcher.close()
     assert [first, *others] == ["ba", "dc", "fe"]
@@ -90,7 +89,7 @@ def test_what_does_not_fit_is_halved_and_stays_so(pool: ThreadPoolExecutor) -> N
             raise MemoryError
 
     model = Model(check)
-    batcher = Batcher(model, size=8, wait=LONG)
+    batcher = batches(model, size=8, wait=LONG)
     jobs = [f"{number}x" for number in range(8)]
     assert asked(pool, batcher, jobs) == [job[::-1] for job in jobs]
     assert model.sizes == [8, 4, 2, 2, 2, 2]
@@ -103,7 +102,7 @@ def test_what_does_not_fit_alone_fails() -> None:
     def check(jobs: Sequence[str]) -> None:
         raise MemoryError("too long")
 
-    batcher = Batcher(Model(check), size=8, wait=0.0)
+    batcher = batches(Model(check), size=8, wait=0.0)
     with pytest.raises(ModelError, match="MemoryError: too long"):
         batcher.do("ab")
     batcher.close()
@@ -114,7 +113,7 @@ def test_what_ends_the_run_is_tried_once_and_told_all(pool: ThreadPoolExecutor) 
         raise CannotGoOn("the device is gone")
 
     model = Model(check)
-    batcher = Batcher(model, size=3, wait=LONG)
+    batcher = batches(model, size=3, wait=LONG)
     answers = asked(pool, batcher, ["ab", "cd", "ef"])
     batcher.close()
     assert [(type(each), str(each)) for each in answers] == [(CannotGoOn, "the device is gone")] * 3
@@ -122,7 +121,7 @@ def test_what_ends_the_run_is_tried_once_and_told_all(pool: ThreadPoolExecutor) 
 
 
 def test_a_result_too_few_fails_all_but_hangs_none(pool: ThreadPoolExecutor) -> None:
-    batcher: Batcher[str, str] = Batcher(lambda jobs: [], size=2, wait=LONG)
+    batcher: Batches = batches(lambda jobs: [], size=2, wait=LONG)
     answers = asked(pool, batcher, ["ab", "cd"])
     batcher.close()
     assert [type(each) for each in answers] == [ModelError, ModelError]
@@ -136,7 +135,7 @@ def test_closing_serves_who_is_at_work_and_sends_the_rest_away(pool: ThreadPoolE
         assert go_on.wait(LONG)
 
     model = Model(check)
-    batcher = Batcher(model, size=1, wait=0.0)
+    batcher = batches(model, size=1, wait=0.0)
     at_work = pool.submit(batcher.do, "ab")
     assert begun.wait(LONG)
     waiting = [pool.submit(batcher.do, job) for job in ("cd", "ef")]
@@ -158,7 +157,7 @@ def test_a_thread_that_dies_leaves_nobody_waiting(pool: ThreadPoolExecutor) -> N
     def check(jobs: Sequence[str]) -> None:
         raise SystemExit
 
-    batcher = Batcher(Model(check), size=2, wait=LONG)
+    batcher = batches(Model(check), size=2, wait=LONG)
     assert [type(each) for each in asked(pool, batcher, ["ab", "cd"])] == [CannotGoOn] * 2
     with pytest.raises(CannotGoOn):
         batcher.do("ef")
@@ -167,7 +166,7 @@ def test_a_thread_that_dies_leaves_nobody_waiting(pool: ThreadPoolExecutor) -> N
 
 INTERRUPTED = """
 import os, signal, threading, time
-from agents.vlm.clients.batching import Batcher
+from agents.vlm.clients.batching import batches
 
 begun, go_on, calls = threading.Event(), threading.Event(), []
 
@@ -182,7 +181,7 @@ def interrupt():
         time.sleep(0.01)
     os.kill(os.getpid(), signal.SIGINT)
 
-batcher = Batcher(run, size=1, wait=0.0)
+batcher = batches(run, size=1, wait=0.0)
 threading.Thread(target=batcher.do, args=("first",), daemon=True).start()
 begun.wait()
 threading.Thread(target=interrupt).start()
@@ -205,8 +204,8 @@ def test_ctrl_c_ends_the_wait_and_its_job_is_not_done() -> None:
 
 def test_a_program_ends_that_does_not_close_it() -> None:
     program = """
-from agents.vlm.clients.batching import Batcher
-print(Batcher(lambda jobs: jobs, size=1, wait=0.0).do("ab"))
+from agents.vlm.clients.batching import batches
+print(batches(lambda jobs: jobs, size=1, wait=0.0).do("ab"))
 """
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, timeout=LONG

@@ -15,13 +15,13 @@ from naughty_server import MODEL, NaughtyServer
 
 pytest.importorskip("openai", reason="needs pip install 'er-gym[vlm]'")
 
+from agents.factory import comparable_settings
 from agents.vlm.chat import Message, ModelError, Reply
 from agents.vlm.clients import endpoints
 from agents.vlm.clients.budget import Budget, Ledger
 from agents.vlm.clients.failures import Failure
 from agents.vlm.clients.openai_server import OpenAIClient
 from agents.vlm.clients.supervisor import RequestSupervisor, ServerEvent
-from agents.vlm.factory import comparable_settings
 from agents.vlm.record import settings_to_record
 from agents.vlm.settings import AgentSettings, Prices
 from er_gym.rollout.agent import CannotGoOn

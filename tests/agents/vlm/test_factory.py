@@ -13,16 +13,16 @@ pytest.importorskip("openai", reason="needs the extra vlm")
 from naughty_server import NaughtyServer
 
 from agents import configs, make_agent
-from agents.vlm.agent import VLMAgent
-from agents.vlm.chat import Message
-from agents.vlm.clients.budget import Budget
-from agents.vlm.factory import (
+from agents.factory import (
     AgentFactory,
     comparable_settings,
     is_model_agent,
     load_settings,
     settings_file,
 )
+from agents.vlm.agent import VLMAgent
+from agents.vlm.chat import Message
+from agents.vlm.clients.budget import Budget
 from agents.vlm.settings import AgentSettings
 from er_gym.rollout.run_directory import REPLIES, SPENDING
 

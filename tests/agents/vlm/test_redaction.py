@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from agents.vlm.clients.redaction import Secrets
+from agents.vlm.redaction import Secrets
 
 KEY = "sk-test-4f1c9e0b7a2d"
 

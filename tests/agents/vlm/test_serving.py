@@ -547,7 +547,7 @@ def test_the_run_of_an_adapter_is_merged_once_and_whole(
 
     from agents.vlm.chat import Message
     from agents.vlm.clients.local import LocalClient
-    from agents.vlm.merging import merge
+    from agents.vlm.clients.merging import merge
     from agents.vlm.settings import AgentSettings
 
     base = make_tiny_qwen(tmp_path / "base")

@@ -12,7 +12,7 @@ from itertools import pairwise
 import pytest
 
 from agents.vlm.chat import ModelError
-from agents.vlm.clients.stepped_jobs import SteppedJobs
+from agents.vlm.clients.batching import SteppedJobs
 from er_gym.rollout.agent import CannotGoOn
 
 LONG = 60.0  # seconds; only broken code waits so long

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from agents import make_agent
-from agents.vlm.factory import is_model_agent, settings_file
+from agents.factory import is_model_agent, settings_file
 from agents.zoo import index
 from agents.zoo.card import Card, card_text
 from agents.zoo.index import CARD, find_model, model_names, resolved

@@ -24,7 +24,7 @@ from agents.rl.policy_file import (
     trained_steps,
     write_policy,
 )
-from agents.vlm.merging import STAMP, merge
+from agents.vlm.clients.merging import STAMP, merge
 from agents.vlm.tuned_model import RUN, model_directory
 from agents.zoo.card import Kind
 from agents.zoo.index import CARD, MOST_BYTES, SUFFIXES, files_of

@@ -16,12 +16,12 @@ import torch
 from safetensors.torch import load_file, save_file
 from untrained_policy import write_untrained_run
 
+from agents import packing
 from agents.finetune.architecture import load_architecture
 from agents.finetune.new_model import make_model
+from agents.packing import HISTORY, WEIGHTS, new_folder, pack, same_files
 from agents.rl.config import TrainConfig, config_file, load_config
-from agents.zoo import packing
 from agents.zoo.index import CARD
-from agents.zoo.packing import HISTORY, WEIGHTS, new_folder, pack, same_files
 from er_gym.writing import YAML_MARK, ForeignFile
 
 SMALL = ("hidden_size=32", "intermediate_size=32", "num_hidden_layers=1")
@@ -71,8 +71,8 @@ def test_a_policy_of_another_configuration_names_no_command(tmp_path: Path) -> N
 def test_a_language_model_is_stored_small_and_played_as_it_was_trained(
     language_run: Path, tmp_path: Path
 ) -> None:
+    from agents.factory import load_settings
     from agents.vlm.clients.checkpoint import load
-    from agents.vlm.factory import load_settings
 
     folder = tmp_path / "to"
     folder.mkdir()

@@ -17,7 +17,6 @@ from agents.vlm.clients.session import ModelSession
 from agents.vlm.record import without_secrets
 from agents.vlm.settings import AgentSettings
 from er_gym.extras import MissingPackage
-from er_gym.rollout.events import Cost
 
 if TYPE_CHECKING:
     from agents.vlm.agent import VLMAgent
@@ -71,26 +70,14 @@ def load_settings(
     return configs.load(AgentSettings, file, _WHAT, overrides, beneath=beneath)
 
 
-class AgentFactory:
-    """Makes the model agents of a run.
+class AgentFactory(ModelSession):
+    """Makes the model agents of a run: a session with its prompts and its name matcher.
 
-    Attributes:
-        client: the model's client.
-        supervisor: supervises the run's requests; ``supervisor.show`` is called with each event
-            that the user should see.
-
-    Args:
-        name: a model client's name and what the client opens: ``openai:MODEL``
-            (:data:`agents.vlm.clients.registry.CLIENTS`).
-        settings: the agents' settings.
-        directory: holds the reply cache, the ledger and the server events. Without a directory
-            nothing is stored.
-        budget: what the run may spend.
+    Attributes and arguments are those of :class:`~agents.vlm.clients.session.ModelSession`.
 
     Raises:
-        ValueError: the name, the prompts or the matcher's model do not exist, a package is
-            missing, or the directory's ledger is a link.
-        CannotGoOn: there is no key, or the model cannot be loaded.
+        ValueError: as there; or the prompts or the matcher's model do not exist.
+        CannotGoOn: as there.
     """
 
     def __init__(
@@ -104,15 +91,14 @@ class AgentFactory:
         from agents.vlm.prompts import prompts_for
 
         kind, _ = resolve_client(name)  # a wrong name is told before a wrong prompt
-        self.name, self.settings = name, settings
+        self.settings = settings
         try:
             self.prompts = prompts_for(settings)
             self._matcher = Matcher(settings.matching)
             self._matcher.prepare()
         except MissingPackage as error:  # its extra would not be enough for every client
             raise MissingPackage(name, error.package, kind.install) from error
-        self._session = ModelSession(name, settings, directory, budget)
-        self.client, self.supervisor = self._session.client, self._session.supervisor
+        super().__init__(name, settings, directory, budget)
 
     def agent(self, seed: int, name: str = "") -> VLMAgent:
         """An agent for an episode; ``name`` is how its conversation names it, where that is not
@@ -127,15 +113,6 @@ class AgentFactory:
             seed=seed,
             name=name or self.name,
         )
-
-    @property
-    def cost(self) -> Cost | None:
-        """The cost of the run so far; None without a directory."""
-        return self._session.cost
-
-    def close(self) -> None:
-        """Close the client, the ledger and the event log."""
-        self._session.close()
 
 
 def comparable_settings(settings: AgentSettings, prompts_digest: str) -> dict[str, Any]:

@@ -72,14 +72,11 @@ def _merged(base: Path, adapters: tuple[Path, ...]) -> Any:
     import transformers
 
     from agents.vlm.clients.adapters import with_adapter
-    from agents.vlm.clients.checkpoint import one_line
+    from agents.vlm.clients.checkpoint import load_weights, one_line
 
     try:
         config = transformers.AutoConfig.from_pretrained(base, local_files_only=True)
-        maker: Any = transformers.AutoModelForCausalLM
-        if getattr(config, "vision_config", None) is not None:
-            maker = transformers.AutoModelForImageTextToText
-        model = maker.from_pretrained(base, dtype="auto", local_files_only=True)
+        model, _ = load_weights(base, config, dtype="auto", local_files_only=True)
         for adapter in adapters:
             model = with_adapter(model, adapter, merge=True)
     except Exception as error:  # what broken files make of the libraries can be any exception
