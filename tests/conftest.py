@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from forked import fork_workers
 
 ROOT = Path(__file__).resolve().parents[1]
 pytest_plugins = ["episodes_by_hand"]
@@ -23,6 +24,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     os.environ.setdefault("MKL_NUM_THREADS", "1")
+
+fork_workers()
 
 
 def pytest_xdist_auto_num_workers() -> int:

@@ -40,7 +40,7 @@ def page(browser) -> Iterator[Any]:
     """A page; nothing may be asked of another host, and nothing may go wrong in the console."""
     context = browser.new_context()
     page = context.new_page()
-    page.set_default_timeout(30_000)
+    page.set_default_timeout(120_000)
     wrong: list[str] = []
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("console", lambda one: one.type == "error" and wrong.append(one.text))

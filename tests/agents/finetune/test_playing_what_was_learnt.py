@@ -30,17 +30,17 @@ def test_a_tiny_model_with_vision_plays_what_it_has_learnt_by_heart(
         (tmp_path / "actions" / file.name).write_text(words)
     dialect = str(tmp_path / "actions")
     data, base, run, played = (tmp_path / each for each in ("data", "base", "run", "played"))
-    er_gym("collect", "--suite", NAME, "--parts", "imitation", "--kinds", "b", "--limit", "4",
+    er_gym("collect", "--suite", NAME, "--parts", "imitation", "--kinds", "b", "--limit", "2",
            "--workers", "1", "--out", data)  # fmt: skip
     er_gym("new-model", "tiny-vl", "--set", "vocabulary=500", "--data", data, "--dialect", dialect,
            "--out", base)  # fmt: skip
     er_gym("finetune", "--config", "tiny", "--model", base, "--data", data, "--out", run,
            "--set", f"data.dialect={dialect}", "--set", "training.epochs=150",
-           "--set", "training.batch=4", "--set", "training.learning_rate=0.002")  # fmt: skip
+           "--set", "training.batch=2", "--set", "training.learning_rate=0.002")  # fmt: skip
     tasks = ",".join(sorted({each.task_id for each in Collection.open(data).trajectories()}))
     er_gym("bench", "--suite", NAME, "--task-ids", tasks, "--agent", f"hf:{run}",
            "--out", played)  # fmt: skip
     report = load_run(played)
     scores = report.scores[CORRECTED.name]
-    assert len(scores) == tasks.count(",") + 1 == 4
+    assert len(scores) == tasks.count(",") + 1 == 2
     assert [each.task_id for each in scores if not each.success] == []

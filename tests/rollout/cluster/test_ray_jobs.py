@@ -160,7 +160,7 @@ with interrupted_by_sigterm(), ray_machines(RaySettings(), print) as machines:
         )
         assert (done.returncode == 0) == (not ended_by)
         assert "KeyboardInterrupt" in done.stderr or ended_by != ("SIGTERM",)
-        folders.append(Path(done.stdout.strip()))
+        folders.append(Path(done.stdout.splitlines()[0]))
         assert folders[-1].exists() == (ended_by == ("SIGKILL",))
     assert not any(folder.exists() for folder in folders)  # the next one has tidied up
     assert until(lambda: not any(_mentions(pid, folders[1]) for pid in _descendants(1)))
