@@ -26,7 +26,7 @@ from benchmarks.scoring.report import RunReport, load_run
 from benchmarks.scoring.series import Axis, Chart, Series, points
 from benchmarks.scoring.splits import split_results, split_table
 from benchmarks.study.kinds import ABLATION, LADDER, Study
-from benchmarks.study.ladder_settings import CONTROLS
+from benchmarks.study.ladder_settings import CONTROLS, LadderSettings
 from benchmarks.study.results import Result
 from benchmarks.study.run import PlanRecord
 from er_gym.tables import Table, as_markdown
@@ -192,6 +192,7 @@ def _generalisation(ladders: Iterable[Study], others: Iterable[tuple[str, Path]]
     named = [
         (ladder.path.name, _run_of(rung))
         for ladder in ladders
+        if isinstance(ladder.settings, LadderSettings)
         for _, results in ladder.results()
         for rung in results
         if not rung.of.faults and rung.name == [*ladder.settings.stages][-1]
