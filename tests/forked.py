@@ -4,7 +4,7 @@ er-gym spawns its workers, and each imports er-gym for a second, torch and trans
 In the tests a worker forks from a server that has imported them once; it gets what it is given by
 the same pickling. The tests of the workers themselves (tests/rollout) and of whole commands spawn.
 
-``python tests/forked.py ladder WORDS`` is ``er-gym ladder WORDS`` whose phases are forked.
+``python -m tests.forked ladder WORDS`` is ``er-gym ladder WORDS`` whose phases are forked.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def fork_workers(modules: tuple[str, ...] = _MODULES) -> None:
 
 if __name__ == "__main__":
     from benchmarks.cli.main import main
-    from benchmarks.plan import run
+    from benchmarks.study import run
 
     fork_workers(_MODULES_OF_PHASES)
     run.CONTEXT = FORKED  # type: ignore[assignment]

@@ -9,7 +9,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import forked
 import pytest
 import yaml
 from click.testing import CliRunner
@@ -64,7 +63,16 @@ def test_the_phases_are_commands_that_exist(name: str, tmp_path: Path) -> None:
 def test_a_small_ablation_is_run_and_told(tmp_path: Path) -> None:
     file, root = tmp_path / "small.yaml", tmp_path / "out"
     file.write_text(yaml.safe_dump(SMALL), encoding="utf-8")
-    command = [sys.executable, forked.__file__, "ablate", "--config", str(file), "--out", str(root)]
+    command = [
+        sys.executable,
+        "-m",
+        "tests.forked",
+        "ablate",
+        "--config",
+        str(file),
+        "--out",
+        str(root),
+    ]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     first, second = json.loads((root / "result.json").read_text())["studies"]["both"]
     assert (first["name"], first["n"], first["difference"]) == ("once", 1, None)

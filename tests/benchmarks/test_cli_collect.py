@@ -150,9 +150,9 @@ def until(ready: Callable[[], bool], process: subprocess.Popen[bytes]) -> None:
 def test_a_full_disk(
     collected: Path, tmp_path: Path, er_gym: ErGym, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A third of the files fits; then every write fails, as it does when the disk is full."""
+    """Two thirds of the files fit; then every write fails, as it does when the disk is full."""
     out = tmp_path / "x"
-    room = len(content(collected)) // 3
+    room = len(content(collected)) * 2 // 3
     written = 0
 
     def fsync(handle: int) -> None:

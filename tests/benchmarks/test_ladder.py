@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-import forked
 import pytest
 import yaml
 from click.testing import CliRunner
@@ -312,7 +311,7 @@ def test_a_first_model_must_be_there(tmp_path: Path) -> None:
 def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
     file, root = tmp_path / "ladder.yaml", tmp_path / "ladder"
     file.write_text(yaml.safe_dump(SMALL), encoding="utf-8")
-    command = [sys.executable, forked.__file__, "ladder"]
+    command = [sys.executable, "-m", "tests.forked", "ladder"]
     command += ["--config", str(file), "--out", str(root)]
     killed_in = []
     for phase in ("1-imitation", "evaluations/3-reflection"):
@@ -324,7 +323,7 @@ def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
         process.wait()
         killed_in.append(len(done(root)))
     assert killed_in == sorted(set(killed_in))
-    result = CliRunner().invoke(cli, command[2:])
+    result = CliRunner().invoke(cli, command[3:])
     assert result.exit_code == 0, result.output
     settings = LADDER.load(str(file))
     assert done(root) == [phase.name for phase in Study(LADDER, root, settings).plan.phases]
