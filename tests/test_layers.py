@@ -14,12 +14,13 @@ _BASE = {
     "er_gym.extras",
     "er_gym.locking",
     "er_gym.plugins",
+    "er_gym.version",
     "er_gym.writing",
 }
 _TASKS = {*_BASE, "er_gym.thor", "er_gym.tasks"}
 _ENVS = {*_TASKS, "er_gym.envs"}
-_ROLLOUT = {*_ENVS, "er_gym", "er_gym.rollout"}
-_DATA = {*_ROLLOUT, "er_gym.data"}
+_ROLLOUT = {*_ENVS, "er_gym.rollout"}
+_DATA = {*_ROLLOUT, "er_gym", "er_gym.data"}
 _AGENTS = {*_DATA, "agents"}
 _SCORING = {*_DATA, "benchmarks.scoring", "benchmarks.terminal"}
 _COMMAND = {*_AGENTS, *_SCORING, "benchmarks", "benchmarks.cli"}
@@ -27,6 +28,7 @@ _SCRIPTS = {*_COMMAND, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "be
 ALLOWED = {
     "er_gym.plugins": {"er_gym.plugins"},
     "er_gym.activity": set(),
+    "er_gym.version": set(),
     "er_gym.writing": set(),
     "er_gym.extras": set(),
     "er_gym.locking": _BASE,
@@ -34,8 +36,9 @@ ALLOWED = {
     "er_gym.thor": {*_BASE, "er_gym.sim", "er_gym.thor"},
     "er_gym.tasks": _TASKS,
     "er_gym.envs": _ENVS,
-    "er_gym": _ENVS,
     "er_gym.rollout": _ROLLOUT,
+    # What the package offers by itself; it imports most of that when it is asked for.
+    "er_gym": _ROLLOUT,
     "er_gym.data": _DATA,
     "agents": _AGENTS,
     "benchmarks.scoring": _SCORING,
