@@ -1,4 +1,20 @@
-"""Agents, which act on observations; :func:`make_agent` makes one by name."""
+"""Agents, which act on observations; :func:`make_agent` makes one by name.
+
+::
+
+    import er_gym
+    from agents import make_agent
+
+    agent = make_agent("searcher", seed=0)
+    env = er_gym.EmbodiedEnv(obs_mode=agent.obs_mode)
+    task = er_gym.load_suite("mini").tasks[0]
+    record = er_gym.play_episode(env, agent, task, seed=0)
+
+A name is that of one of :data:`AGENTS` (``oracle``, ``random``, ``searcher``), a class of your own
+(``package.module:Class``), a trained policy (``rl:RUN``), a model of the zoo (``zoo:NAME``), or a
+model agent (``openai:MODEL``, ``hf:PATH``). ``examples/own_agent.py`` writes one;
+``docs/agents.md`` explains those that ask models.
+"""
 
 from __future__ import annotations
 
@@ -131,3 +147,7 @@ def _rl_agent(name: str, path: str) -> Agent:
     except ImportError as error:
         raise MissingPackage(f"agent {name}", str(error.name), "er-gym[rl]") from error
     return RLAgent(path)
+
+
+def __dir__() -> list[str]:
+    return [*__all__]

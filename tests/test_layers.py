@@ -15,12 +15,13 @@ _BASE = {
     "er_gym.locking",
     "er_gym.plugins",
     "er_gym.tables",
+    "er_gym.version",
     "er_gym.writing",
 }
 _TASKS = {*_BASE, "er_gym.thor", "er_gym.tasks"}
 _ENVS = {*_TASKS, "er_gym.envs"}
-_ROLLOUT = {*_ENVS, "er_gym", "er_gym.resumable", "er_gym.rollout"}
-_DATA = {*_ROLLOUT, "er_gym.data"}
+_ROLLOUT = {*_ENVS, "er_gym.resumable", "er_gym.rollout"}
+_DATA = {*_ROLLOUT, "er_gym", "er_gym.data"}
 _VLM = {"agents.vlm.parsing", "agents.vlm", "agents.vlm.clients"}
 _OF_AGENTS = {
     "agents.configs": set(),
@@ -55,6 +56,7 @@ ALLOWED = {
     "er_gym.plugins": {"er_gym.plugins"},
     "er_gym.activity": set(),
     "er_gym.tables": set(),
+    "er_gym.version": set(),
     "er_gym.writing": {"er_gym.writing"},
     "er_gym.extras": set(),
     "er_gym.locking": _BASE,
@@ -62,9 +64,10 @@ ALLOWED = {
     "er_gym.thor": {*_BASE, "er_gym.sim", "er_gym.thor"},
     "er_gym.tasks": _TASKS,
     "er_gym.envs": _ENVS,
-    "er_gym": _ENVS,
     "er_gym.resumable": _TASKS,
     "er_gym.rollout": _ROLLOUT,
+    # What the package offers by itself; it imports most of that when it is asked for.
+    "er_gym": _ROLLOUT,
     "er_gym.data": _DATA,
     **{name: {*_DATA, name, *others} for name, others in _OF_AGENTS.items()},
     "benchmarks.scoring": _SCORING,

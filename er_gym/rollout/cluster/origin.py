@@ -7,7 +7,7 @@ import socket
 import sys
 from dataclasses import dataclass
 
-from er_gym import __version__
+from er_gym.version import __version__
 
 
 @dataclass(frozen=True)
