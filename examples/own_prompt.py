@@ -11,8 +11,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-import er_gym
 from agents.vlm.factory import AgentFactory
+
+import er_gym
 from agents.vlm.settings import AgentSettings
 from er_gym.tasks.suites import config_directory
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+from collections import defaultdict
 from collections.abc import Container, Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+from support import in_one_test
 
 _BASE = {
     "er_gym.activity",
@@ -48,8 +50,9 @@ _OF_AGENTS = {
 ``agents``; ``agents`` alone is its own top-level modules."""
 _AGENTS = {*_DATA, *_OF_AGENTS}
 _SCORING = {*_DATA, "benchmarks.scoring", "benchmarks.terminal"}
-_MONITOR = {*_AGENTS, *_SCORING, "benchmarks", "benchmarks.vlm_run", "benchmarks.monitor"}
-_COMMAND = {*_MONITOR, "benchmarks.cli"}
+_STUDY = {*_AGENTS, *_SCORING, "benchmarks.study"}
+_MONITOR = {*_STUDY, "benchmarks.vlm_run", "benchmarks.monitor"}
+_COMMAND = {*_MONITOR, "benchmarks", "benchmarks.cli"}
 _HARNESS = {*_COMMAND, "benchmarks.harness"}
 _SCRIPTS = {*_HARNESS, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "benchmarks.pages"}
 ALLOWED = {
@@ -72,10 +75,12 @@ ALLOWED = {
     **{name: {*_DATA, name, *others} for name, others in _OF_AGENTS.items()},
     "benchmarks.scoring": _SCORING,
     "benchmarks.terminal": {*_ENVS, "benchmarks.terminal"},
+    "benchmarks.study": _STUDY,
+    "benchmarks.eyes": {*_COMMAND, "benchmarks.eyes"},
     "benchmarks.vlm_run": _AGENTS,
     "benchmarks.monitor": _MONITOR,
     "benchmarks.cli": _COMMAND,
-    "benchmarks": _COMMAND,
+    "benchmarks": {*_AGENTS, *_SCORING, "benchmarks", "benchmarks.vlm_run"},
     "benchmarks.harness": _HARNESS,
     # Scripts that measure or check look at the engine itself.
     "benchmarks.perf": _SCRIPTS,
@@ -117,45 +122,91 @@ def imported_modules(source: str, package: str) -> Iterator[tuple[int, str]]:
             yield from ((node.lineno, f"{base}.{alias.name}") for alias in node.names)
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_imports_only_from_layers_below(path: Path) -> None:
+def imports_of(path: Path) -> list[tuple[int, str]]:
+    """Line and name of everything that a file of ours imports."""
     name = module_name(path)
-    mine = layer(name)
-    assert mine is not None
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+    return [*imported_modules(path.read_text(encoding="utf-8"), package)]
+
+
+IMPORTS = {path: imports_of(path) for path in SOURCES}
+
+
+@in_one_test("path", SOURCES)
+def test_imports_only_from_layers_below(path: Path) -> None:
+    mine = layer(module_name(path))
+    assert mine is not None
     wrong = [
         f"line {line}: {mine} may not import {imported}"
-        for line, imported in imported_modules(path.read_text(encoding="utf-8"), package)
+        for line, imported in IMPORTS[path]
         if (theirs := layer(imported)) is not None and theirs not in ALLOWED[mine]
     ]
     assert not wrong
 
 
-def test_each_folder_of_the_agents_has_its_rule() -> None:
+@pytest.mark.parametrize("top", ["agents", "benchmarks"])
+def test_each_folder_has_its_rule(top: str) -> None:
     folders = {".".join(path.parent.relative_to(ROOT).parts) for path in SOURCES}
-    shared = {"agents.configs"}  # a module
-    assert {each for each in folders if each.startswith("agents")} == {*_OF_AGENTS} - shared
+    inside = {each for each in folders if each.startswith(f"{top}.")}
+    assert {each for each in inside if layer(each) == top} == set()
 
 
-def test_the_folders_of_the_agents_form_no_circle() -> None:
-    TopologicalSorter(_OF_AGENTS).prepare()
+def imported_by_module() -> dict[str, set[str]]:
+    """Each module of ours to those that it imports; late imports, and those for types alone,
+    count too."""
+    names = {module_name(path) for path in SOURCES}
+    return {
+        (name := module_name(path)): {
+            module
+            for _, imported in IMPORTS[path]
+            if (module := known_module(imported, names)) not in (None, name)
+        }
+        for path in SOURCES
+    }
 
 
 def test_no_module_imports_itself_by_way_of_others() -> None:
-    """Late imports, and those for types alone, count too."""
-    names = {module_name(path): path for path in SOURCES}
-    graph: dict[str, set[str]] = {}
-    for name, path in names.items():
-        package = name if path.name == "__init__.py" else name.rpartition(".")[0]
-        found = (
-            known_module(imported, names)
-            for _, imported in imported_modules(path.read_text(encoding="utf-8"), package)
-        )
-        graph[name] = {module for module in found if module is not None} - {name}
+    assert circle_in(imported_by_module()) == ""
+
+
+def test_the_files_and_folders_of_a_folder_import_one_another_in_one_direction() -> None:
+    """Each folder is a room whose doors all open the same way."""
+    graphs: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for module, others in imported_by_module().items():
+        for other in others:
+            package, one, two = where_they_part(module, other)
+            if package and one and two:
+                graphs[package][f"{package}.{one}"].add(f"{package}.{two}")
+    assert [circle for graph in graphs.values() if (circle := circle_in(graph))] == []
+
+
+def where_they_part(one: str, other: str) -> tuple[str, str, str]:
+    """The innermost folder that holds two modules, and the file or folder in it of each."""
+    parts, others = one.split("."), other.split(".")
+    same = next(
+        (
+            place
+            for place, pair in enumerate(zip(parts, others, strict=False))
+            if pair[0] != pair[1]
+        ),
+        min(len(parts), len(others)),
+    )
+    return ".".join(parts[:same]), "".join(parts[same : same + 1]), "".join(others[same : same + 1])
+
+
+def circle_in(graph: dict[str, set[str]]) -> str:
+    """A circle of imports in words; empty if there is none."""
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
-        pytest.fail(" imports ".join(reversed(error.args[1])))
+        return " imports ".join(reversed(error.args[1]))
+    return ""
+
+
+def test_a_circle_is_seen() -> None:
+    assert circle_in({"a": {"b"}, "b": {"c"}, "c": {"a"}}).count("imports") == 3
+    assert where_they_part("x.a.b", "x.c") == ("x", "a", "c")
+    assert where_they_part("x", "x.c") == ("x", "", "c")
 
 
 def known_module(imported: str, known: Container[str]) -> str | None:

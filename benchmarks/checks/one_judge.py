@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import random
 import sys
-from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +23,7 @@ import click
 
 from agents import make_agent
 from benchmarks.harness.output import print_table, progress
+from benchmarks.harness.samples import sample_of_types
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.envs.actions import Action
@@ -215,21 +216,6 @@ def judge_all(tasks: Sequence[Task], protocol: str = "default", seed: int = 0) -
                 yield judge_twice(env, task, player, seed)
     finally:
         env.close()
-
-
-def sample_of_types(
-    tasks: Iterable[Task], types: Sequence[str], each: int, seed: str = ""
-) -> list[Task]:
-    """A number of tasks of each type, the same for the same seed; all types if none is named."""
-    by_type: dict[str, list[Task]] = defaultdict(list)
-    for task in tasks:
-        if not types or task.type.name in types:
-            by_type[task.type.name].append(task)
-    return [
-        task
-        for name, of_type in sorted(by_type.items())
-        for task in random.Random(f"{name}{seed}").sample(of_type, min(each, len(of_type)))
-    ]
 
 
 @click.command()

@@ -31,7 +31,7 @@ from benchmarks.harness.output import (
     progress,
     write_figures,
 )
-from benchmarks.pages.gallery import sheet
+from benchmarks.harness.samples import sheet
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.scene_graph import scene_graph_of
 from er_gym.sim.scene import SCENE_NAMES, load_scene

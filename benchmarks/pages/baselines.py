@@ -27,11 +27,11 @@ from agents.rl.callbacks import read_curve
 from agents.rl.config import TrainConfig, how_learnt, load_config
 from agents.rl.policy_file import MODEL
 from agents.rl.policy_observation import IMAGES
-from benchmarks.checks.one_judge import sample_of_types
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import force_option
 from benchmarks.cli.progress import Progress
 from benchmarks.harness.output import ROOT
+from benchmarks.harness.samples import sample_of_types
 from benchmarks.scoring.curves import draw_curves
 from benchmarks.scoring.metrics import Score, score_episode, wilson
 from benchmarks.scoring.scorers import CORRECTED

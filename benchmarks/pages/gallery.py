@@ -8,19 +8,20 @@ Without options the gallery is made anew; with ``--kinds``, one contact sheet of
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import click
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
+from PIL import Image
 from rich.progress import track
 
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import force_option
 from benchmarks.harness.output import ROOT
+from benchmarks.harness.samples import sheet
 from er_gym.sim.actions import perform
 from er_gym.sim.agent import Agent
 from er_gym.sim.render.appearance import Appearance, compute_appearance
@@ -41,7 +42,7 @@ from er_gym.writing import (
 )
 
 DOCS = ROOT / "docs"
-_SIDE, _LABEL, _COLUMNS = 150, 15, 10
+_SIDE, _COLUMNS = 150, 10
 _ROOM = (640, 400)
 _ROOMS = {"kitchens": (1, 27), "living_rooms": (212, 227), "bedrooms": (301, 315),
           "bathrooms": (403, 413)}  # fmt: skip
@@ -126,19 +127,6 @@ def portrait(look: Appearance, side: int = _SIDE, yaw: float = 30.0) -> NDArray[
     nothing = (frames.ids == 0) & (frames.rgb.sum(axis=2) == 0)
     frames.rgb[nothing] = 228
     return frames.rgb
-
-
-def sheet(pictures: Sequence[tuple[str, NDArray[np.uint8]]], columns: int) -> Image.Image:
-    """Pictures (S, S, 3) in rows, each with its name under it."""
-    side = len(pictures[0][1])
-    rows = -(-len(pictures) // columns)
-    page = Image.new("RGB", (columns * side, rows * (side + _LABEL)), "white")
-    pen = ImageDraw.Draw(page)
-    for k, (name, picture) in enumerate(pictures):
-        x, y = k % columns * side, k // columns * (side + _LABEL)
-        page.paste(Image.fromarray(picture), (x, y))
-        pen.text((x + 4, y + side + 1), name, fill="black")
-    return page
 
 
 def room_views(scene_name: str) -> list[NDArray[np.uint8]]:

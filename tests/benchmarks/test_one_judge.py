@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from benchmarks.checks.one_judge import PLAYERS, judge_twice, sample_of_types
+from benchmarks.checks.one_judge import PLAYERS, judge_twice
+from benchmarks.harness.samples import sample_of_types
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.report import load_run
 from benchmarks.scoring.scorers import CORRECTED
