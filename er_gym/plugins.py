@@ -7,7 +7,9 @@ There are two ways to name a plugin:
   ``er_gym.agents``.
 
 A :class:`Registry` looks a name up among er-gym's own objects, then in both of these ways.
-Tables that are complete before anything is looked up take everything that :func:`added` finds.
+Tables that are complete before anything is looked up (task types, verbs, actions and shapes) take
+everything that :func:`added` finds: what installed packages declare, and what the environment
+variable ``ER_GYM_PLUGINS`` names, such as ``verbs=household.verbs:CLEAN``.
 ``docs/extending.md`` has a walk-through for each registry.
 """
 
@@ -36,6 +38,11 @@ class NotImported(PluginError):
     """A name is spelled as it should be, and what it stands for was not to be imported."""
 
 
+VARIABLE = "ER_GYM_PLUGINS"
+"""The environment variable that names rows of tables: ``TABLE=package.module:Name``, with commas
+between them."""
+TABLES = ("task_types", "verbs", "actions", "shapes")
+"""The tables that the variable may name; ``er_gym.TABLE`` is the group of their entry points."""
 NOT_FROM_HERE = "import sys; sys.path[:] = [place for place in sys.path if place]\n"
 """The beginning of a program that ``python -c`` runs to ask another interpreter something: else it
 would import a ``json.py`` or ``ai2thor.py`` that lies in the working directory."""
@@ -149,28 +156,47 @@ def load_entry_point(entry: metadata.EntryPoint, kind: str) -> Any:
 
 
 def added(
-    kind: str, group: str, variable: str, expected: str, *, registers: bool = False
+    kind: str, table: str, expected: str, *, registers: bool = False
 ) -> Iterator[tuple[Any, str]]:
-    """The objects that an environment variable names and installed packages declare.
+    """The rows of a table that :data:`VARIABLE` names and installed packages declare.
 
     Args:
-        kind: the kind of the objects, for messages: ``"verb"``.
-        group: the group of entry points.
-        variable: the environment variable; it holds dotted names, separated by commas.
+        kind: the kind of the rows, for messages: ``"verb"``.
+        table: one of :data:`TABLES`.
         expected: what an object has to be, for messages.
         registers: whether a module registers its objects itself when it is imported. Then a module
             that is being imported now is left out: its import made er-gym call this function, and
             goes on afterwards.
 
     Raises:
-        PluginError: something cannot be loaded.
+        PluginError: something cannot be loaded, or the variable is not spelled so.
     """
-    for name in filter(None, map(str.strip, os.environ.get(variable, "").split(","))):
+    for name in _named_for(table):
         if not (registers and _being_imported(name.partition(":")[0])):
-            yield _loaded(name, kind, expected), f"{name} in ${variable}"  # the user named it
+            yield _loaded(name, kind, expected), f"{name} in ${VARIABLE}"  # the user named it
+    group = f"er_gym.{table}"
     for name, entry in sorted(entry_points(group).items()):
         if not (registers and _being_imported(entry.module)):
             yield load_entry_point(entry, kind), f"entry point {name!r} of {group}"
+
+
+def _named_for(table: str) -> list[str]:
+    """The dotted names that :data:`VARIABLE` gives for a table.
+
+    Raises:
+        PluginError: it gives one for something that is no table.
+    """
+    named = []
+    for item in filter(None, map(str.strip, os.environ.get(VARIABLE, "").split(","))):
+        of, equals, name = map(str.strip, item.partition("="))
+        if of not in TABLES or not equals:
+            raise PluginError(
+                f"${VARIABLE} holds {item!r:.80}; give TABLE=package.module:Name with commas "
+                f"between them, where TABLE is one of: {', '.join(TABLES)}"
+            )
+        if of == table:
+            named.append(name)
+    return named
 
 
 def _being_imported(module: str) -> bool:

@@ -21,9 +21,8 @@ from er_gym.tasks.types import BY_NAME, TASK_TYPES, register, task_type
 
 TESTS = Path(__file__).parent
 ADDED = {
-    "ER_GYM_TASK_TYPES": "household_tasks:OPEN",
-    "ER_GYM_ACTIONS": "household_engine:polish",
-    "ER_GYM_SHAPES": "household_engine:lava_lamp",
+    "ER_GYM_PLUGINS": "task_types=household_tasks:OPEN,"
+    "actions=household_engine:polish,shapes=household_engine:lava_lamp",
 }
 ENTRY_POINTS = """\
 [er_gym.task_types]
@@ -90,7 +89,7 @@ def test_the_command_lists_added_types_and_says_what_is_wrong_with_one() -> None
         *("Household-Open-v0", "Manipulate:", "Opening,", "24", "steps;"),
         *("single_open,", "household_open"),
     ]
-    wrong = run(["-m", "benchmarks.cli", "envs"], ER_GYM_TASK_TYPES="household_tasks:CLOSE")
+    wrong = run(["-m", "benchmarks.cli", "envs"], ER_GYM_PLUGINS="task_types=household_tasks:CLOSE")
     assert wrong.returncode == 2
     assert wrong.stderr.count("\n") == 1
     assert "'household_tasks' has no 'CLOSE'" in wrong.stderr

@@ -13,7 +13,7 @@ import pytest
 from benchmarks.checks.doc_blocks.blocks import PYTHON, blocks
 
 RUN_EACH = """
-import runpy  # the first file sets ER_GYM_VERBS itself, before anything of er-gym is imported
+import runpy  # the first file sets ER_GYM_PLUGINS itself, before anything of er-gym is imported
 runpy.run_module("household.play")
 
 from agents import make_agent
@@ -71,9 +71,8 @@ def test_the_files_of_the_walk_throughs_work(page: str, repository: Path, tmp_pa
         env={
             **os.environ,
             "PYTHONPATH": os.pathsep.join((str(repository), str(tmp_path))),
-            "ER_GYM_TASK_TYPES": "household.tasks:OPEN",
-            "ER_GYM_ACTIONS": "household.actions:polish",
-            "ER_GYM_SHAPES": "household.shapes:lava_lamp",
+            "ER_GYM_PLUGINS": "task_types=household.tasks:OPEN,"
+            "actions=household.actions:polish,shapes=household.shapes:lava_lamp",
         },
         capture_output=True,
         text=True,
@@ -92,16 +91,13 @@ def test_the_groups_are_those_that_are_looked_into(page: str) -> None:
     from agents.vlm.clients.registry import CLIENTS
     from er_gym.data.exports import EXPORTS
     from er_gym.envs.observations import OBSERVATIONS
-    from er_gym.sim.actions import registry as actions
-    from er_gym.sim.render.shapes import registry as shapes
-    from er_gym.tasks import types, verbs
+    from er_gym.plugins import TABLES, VARIABLE
     from er_gym.tasks.paraphrase import PARAPHRASERS
     from er_gym.tasks.suites import suite_registry
 
     own = (AGENTS, CLIENTS, EXPORTS, OBSERVATIONS, PARAPHRASERS, REWARDS, WRITERS)
     registries = (*own, suite_registry())
-    tables = (types, verbs, actions, shapes)
-    groups = {*(table.GROUP for table in tables), *(registry.group for registry in registries)}
-    for table in tables:
-        assert f"`{table.VARIABLE}=…,…` | `{table.GROUP}`" in page
+    groups = {*(f"er_gym.{table}" for table in TABLES), *(each.group for each in registries)}
+    for table in TABLES:
+        assert f"`{VARIABLE}={table}=…` | `er_gym.{table}`" in page
     assert groups == set(re.findall(r"\| `(er_gym\.\w+)` \|", page))

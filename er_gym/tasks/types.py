@@ -3,7 +3,7 @@
 Names, groups and step limits are the paper's (Embodied-Reasoner, arXiv 2503.21696).
 
 Other packages add rows (``docs/extending.md``): what :func:`register` returns, named in the
-environment variable ``ER_GYM_TASK_TYPES`` or by entry points in the group ``er_gym.task_types``.
+environment variable ``ER_GYM_PLUGINS`` or by entry points in the group ``er_gym.task_types``.
 ``import er_gym`` looks for them.
 """
 
@@ -18,10 +18,6 @@ from typing import Protocol
 
 from er_gym.plugins import PluginError, added
 
-GROUP = "er_gym.task_types"
-"""The entry points in which packages declare task types."""
-VARIABLE = "ER_GYM_TASK_TYPES"
-"""The environment variable that names task types, such as ``my_package.tasks:OPEN``."""
 SEARCH, MANIPULATE, TRANSPORT, COMPOSITE = "Search", "Manipulate", "Transport", "Composite"
 GROUPS = (SEARCH, MANIPULATE, TRANSPORT, COMPOSITE)
 """The groups, in the order of the paper's result table."""
@@ -125,7 +121,7 @@ def load_added() -> None:
         PluginError: a row cannot be loaded or used.
     """
     expected = f"an {__name__}.TaskType"
-    for found, origin in added("task type", GROUP, VARIABLE, expected, registers=True):
+    for found, origin in added("task type", "task_types", expected, registers=True):
         if not isinstance(found, TaskType):
             raise PluginError(f"{origin} is {found!r}; give {expected}")
         register(found)

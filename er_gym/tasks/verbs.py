@@ -8,7 +8,7 @@ parsing of replies, prompts and tool calls all derive from the rows. Other packa
 (``docs/extending.md``):
 
 - with an entry point in the group ``er_gym.verbs``;
-- with dotted names in the environment variable ``ER_GYM_VERBS``, separated by commas;
+- with ``verbs=package.module:Name`` in the environment variable ``ER_GYM_PLUGINS``;
 - with :func:`register`, before anything derives from the table.
 
 The table is built when it is first used, not when this module is imported, because a module that
@@ -27,14 +27,10 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from er_gym.plugins import PluginError, added
+from er_gym.plugins import VARIABLE, PluginError, added
 from er_gym.thor.object_types import OBJECT_TYPES
 from er_gym.thor.objects import PROPERTY_OF_STATE
 
-GROUP = "er_gym.verbs"
-"""The entry point group in which packages declare verbs."""
-VARIABLE = "ER_GYM_VERBS"
-"""The environment variable that names verbs, such as ``my_package.verbs:CLEAN``."""
 ANY, EMPTY, FULL = "any", "empty", "full"
 """What a verb may require of the hand, besides certain object types in it."""
 
@@ -295,7 +291,7 @@ def table() -> tuple[Verb, ...]:
     expected = f"an {__name__}.Verb"
     given = [
         *((verb, "register()") for verb in _registered),
-        *added("verb", GROUP, VARIABLE, expected),
+        *added("verb", "verbs", expected),
     ]
     for verb, origin in given:
         if not isinstance(verb, Verb):

@@ -15,14 +15,14 @@ from agents.vlm.templates import directory_of, load_templates
 from er_gym.envs.actions import ACTIONS
 
 TESTS = Path(__file__).parents[1]
-ADDED = "household_verbs:CLEAN,household_verbs:FILL,household_verbs:CROUCH"
+ADDED = ",".join(f"verbs=household_verbs:{name}" for name in ("CLEAN", "FILL", "CROUCH"))
 
 
 def run(code: list[str], verbs: str) -> subprocess.CompletedProcess[str]:
     path = os.pathsep.join((str(TESTS.parent), str(TESTS / "outside")))
     return subprocess.run(
         [sys.executable, *code],
-        env={**os.environ, "PYTHONPATH": path, "ER_GYM_VERBS": verbs},
+        env={**os.environ, "PYTHONPATH": path, "ER_GYM_PLUGINS": verbs},
         capture_output=True,
         text=True,
         check=False,
@@ -107,7 +107,7 @@ def test_a_module_of_verbs_may_be_the_first_that_is_imported() -> None:
 
 def test_the_command_says_what_is_wrong_with_a_verb() -> None:
     command = ["-m", "benchmarks.cli", "bench", "--suite", "mini", "--agent", "random"]
-    done = run(command, "household_verbs:NOTHING")
+    done = run(command, "verbs=household_verbs:NOTHING")
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "'household_verbs' has no 'NOTHING'" in done.stderr

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from er_gym.envs.actions import ACTIONS
-from er_gym.plugins import PluginError
+from er_gym.plugins import VARIABLE, PluginError
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.tasks.verbs import CLOSE, OPEN, PUT, Verb, Words
@@ -58,12 +58,12 @@ def test_canonical_verb() -> None:
 
 def fresh_table(monkeypatch: pytest.MonkeyPatch, names: str) -> tuple[Verb, ...]:
     monkeypatch.syspath_prepend(str(OUTSIDE))
-    monkeypatch.setenv(verbs.VARIABLE, names)
+    monkeypatch.setenv(VARIABLE, names)
     return verbs.table.__wrapped__()
 
 
 def test_added_verbs_follow_in_the_order_of_their_names(monkeypatch: pytest.MonkeyPatch) -> None:
-    names = ("household_verbs:FILL", "household_verbs:CLEAN", "household_verbs:FILL")
+    names = [f"verbs=household_verbs:{name}" for name in ("FILL", "CLEAN", "FILL")]
     found = fresh_table(monkeypatch, " , ".join(names))
     assert found[: len(verbs.OWN)] == verbs.OWN
     assert [verb.name for verb in found[len(verbs.OWN) :]] == ["clean", "fill"]
@@ -72,10 +72,12 @@ def test_added_verbs_follow_in_the_order_of_their_names(monkeypatch: pytest.Monk
 @pytest.mark.parametrize(
     ("names", "message"),
     [
-        ("household_verbs:CLAEN", r"verb 'household_verbs:CLAEN'.* \(did you mean CLEAN\?\)"),
-        ("household_verbs", "is not a package.module:Name"),
-        ("household_verbs:Words", r"ER_GYM_VERBS is .*give an er_gym\.tasks\.verbs\.Verb"),
-        ("no_such:X", "Cannot import 'no_such'"),
+        ("verbs=household_verbs:CLAEN", r"verb 'household_verbs:CLAEN'.* \(did you mean CLEAN\?\)"),
+        ("verbs=household_verbs", "is not a package.module:Name"),
+        ("verbs=household_verbs:Words", r"ER_GYM_PLUGINS is .*give an er_gym\.tasks\.verbs\.Verb"),
+        ("verbs=no_such:X", "Cannot import 'no_such'"),
+        ("household_verbs:FILL", r"holds 'household_verbs:FILL'; give TABLE=package\.module:Name"),
+        ("words=a:B", r"holds 'words=a:B'.* one of: task_types, verbs, actions, shapes"),
     ],
 )
 def test_wrong_names_in_the_variable(
@@ -131,7 +133,7 @@ def test_two_verbs_may_not_be_said_alike() -> None:
 
 def test_a_verb_cannot_be_registered_late() -> None:
     assert verbs.table()
-    with pytest.raises(PluginError, match=r"'clean' is registered too late.*\$ER_GYM_VERBS"):
+    with pytest.raises(PluginError, match=r"'clean' is registered too late.*\$ER_GYM_PLUGINS"):
         verbs.register(CLEAN)
 
 

@@ -120,7 +120,7 @@ SLOW: Mapping[str, tuple[str, ...]] = {
         "README.md: er-gym tasks generate",
         "docs/extending.md: er-gym tasks generate",
         "docs/extending.md: er-gym bench",
-        "docs/extending.md: ER_GYM_VERBS",
+        "docs/extending.md: ER_GYM_PLUGINS=verbs",
         "docs/faults.md: er-gym bench --suite mini --agent searcher",
         "docs/faults.md: for rate",
         "docs/tasks.md: er-gym tasks verify er-1k",

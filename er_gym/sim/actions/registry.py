@@ -13,7 +13,7 @@ action's parameters. It returns the event's ``actionReturn`` or raises
   given.
 
 Other packages add actions (``docs/extending.md``): functions under :func:`action`, which are named
-in the environment variable ``ER_GYM_ACTIONS`` or by entry points in the group ``er_gym.actions``.
+in the environment variable ``ER_GYM_PLUGINS`` or by entry points in the group ``er_gym.actions``.
 """
 
 from __future__ import annotations
@@ -49,10 +49,6 @@ REFUSED = {
     "CreateHouse": "it has the recorded iTHOR rooms and no procedural houses; backend='unity' has"
 }
 """Actions of AI2-THOR that the embedded engine lacks, with the reason."""
-GROUP = "er_gym.actions"
-"""The entry points in which packages declare actions."""
-VARIABLE = "ER_GYM_ACTIONS"
-"""The environment variable that names actions, such as ``my_package.actions:polish``."""
 REQUIRED: Any = inspect.Parameter.empty
 """The default of a required parameter."""
 _LONGEST_QUOTE = 200
@@ -219,7 +215,7 @@ def load_added() -> None:
         PluginError: an action cannot be loaded, or is not a registered function.
     """
     expected = f"a function under @{__name__}.action"
-    for found, origin in added("AI2-THOR action", GROUP, VARIABLE, expected, registers=True):
+    for found, origin in added("AI2-THOR action", "actions", expected, registers=True):
         if not any(each.run is found for signatures in ACTIONS.values() for each in signatures):
             raise PluginError(f"{origin} is {found!r}; give {expected}")
 

@@ -1,7 +1,7 @@
 """The table of shapes by object type.
 
 Other packages add shapes (``docs/extending.md``): functions under :func:`shape`, which are named in
-the environment variable ``ER_GYM_SHAPES`` or by entry points in the group ``er_gym.shapes``.
+the environment variable ``ER_GYM_PLUGINS`` or by entry points in the group ``er_gym.shapes``.
 """
 
 from __future__ import annotations
@@ -17,10 +17,6 @@ from er_gym.sim.render.patch import Patch
 Shape = Callable[[Appearance], Mesh]
 SHAPES: dict[str, Shape] = {}
 """The shape of each object type."""
-GROUP = "er_gym.shapes"
-"""The entry points in which packages declare shapes."""
-VARIABLE = "ER_GYM_SHAPES"
-"""The environment variable that names shapes, such as ``my_package.shapes:lava_lamp``."""
 UNSEEN = frozenset({"Floor"})
 """Types that are drawn with the room and not as objects."""
 _KEPT = 256
@@ -50,7 +46,7 @@ def load_added() -> None:
         PluginError: a shape cannot be loaded, or is not a registered function.
     """
     expected = f"a function under @{__name__}.shape"
-    for found, origin in added("shape", GROUP, VARIABLE, expected, registers=True):
+    for found, origin in added("shape", "shapes", expected, registers=True):
         if not any(each is found for each in SHAPES.values()):
             raise PluginError(f"{origin} is {found!r}; give {expected}")
 
