@@ -94,9 +94,9 @@ def _print(plan: Plan) -> int:
     for phase in plan.phases:
         echo(str(phase))
     with bad_input(PlanError), without_imports():
-        unchecked = check_phases(plan.phases)
+        unchecked = check_phases(plan.phases, only_print=True)
     for each in unchecked:
-        print_problem(f"{each}, since --print runs nothing; it is checked when the plan runs")
+        print_problem(f"{each}; this is checked when the plan runs")
     return 0
 
 

@@ -22,6 +22,7 @@ from agents.finetune.settings import load_settings as load_finetune_settings
 from benchmarks.study.settings import Collected, PlaySettings
 from er_gym.data.dialects import load_dialect
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.extras import MissingPackage
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.types import canonical_names
 
@@ -101,6 +102,4 @@ def check_model_there(path: str) -> None:
 def _check_installed(extra: str) -> None:
     for library in _LIBRARIES[extra]:
         if find_spec(library) is None:
-            raise ValueError(
-                f"{library} is not installed, and this needs it: pip install 'er-gym[{extra}]'"
-            )
+            raise MissingPackage("this phase", library, f"er-gym[{extra}]")

@@ -14,6 +14,7 @@ from benchmarks.study.phase import Phase
 from benchmarks.study.settings import FREE, PlaySettings
 from er_gym import __version__
 from er_gym.activity import begin
+from er_gym.extras import MissingPackage
 from er_gym.locking import Locked, exclusive_use
 from er_gym.plugins import NotImported
 from er_gym.resumable import FolderKind
@@ -140,12 +141,17 @@ def _compared(there: PlanRecord, here: PlanRecord) -> tuple[dict[str, Any], dict
     )
 
 
-def check_phases(phases: Iterable[Phase]) -> list[str]:
+def check_phases(phases: Iterable[Phase], *, only_print: bool = False) -> list[str]:
     """Check what phases are given, before hours are spent on those before them.
 
+    Args:
+        phases: which.
+        only_print: whether they are not to run here. Then a package that is missing here is no
+            error.
+
     Returns:
-        What could not be checked, since nothing was to be imported
-        (:func:`er_gym.plugins.without_imports`), each once.
+        What could not be checked, each once: nothing was to be imported
+        (:func:`er_gym.plugins.without_imports`), or a package is missing here.
 
     Raises:
         PlanError: the command of one would refuse it.
@@ -158,8 +164,11 @@ def check_phases(phases: Iterable[Phase]) -> list[str]:
             try:
                 check()
             except NotImported as told:
-                unchecked[str(told)] = None
+                unchecked[f"{told}, since --print runs nothing"] = None
             except ValueError as error:
+                if only_print and isinstance(error, MissingPackage):
+                    unchecked[str(error)] = None
+                    continue
                 raise PlanError(f"{phase.name}: {error}") from error
     return [*unchecked]
 

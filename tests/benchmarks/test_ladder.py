@@ -296,6 +296,21 @@ def test_print_imports_nothing_that_a_file_names(
     assert "unknown suite 'evil'" in told.output
 
 
+def test_a_plan_can_be_printed_where_it_cannot_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("benchmarks.study.checks.find_spec", lambda library: None)
+    command = ["ladder", "--config", "tiny-text", "--out", str(tmp_path / "x")]
+    missing = "this phase needs torch, which is not installed: pip install 'er-gym[local]'"
+    result = CliRunner().invoke(cli, [*command, "--print"])
+    assert result.exit_code == 0, result.output
+    assert f"{missing}; this is checked when the plan runs" in result.output
+    result = CliRunner().invoke(cli, command)
+    assert result.exit_code == 2
+    assert f"base/new-model: {missing}" in result.output
+    assert not (tmp_path / "x").exists()
+
+
 def test_a_first_model_must_be_there(tmp_path: Path) -> None:
     file, out = tmp_path / "ladder.yaml", tmp_path / "x"
     model = tmp_path / "model"
