@@ -45,7 +45,7 @@ class _Record(BaseModel):
 
 
 class GrownRecord(_Record):
-    """A record that has got fields since it was first written.
+    """A kind of record to which later versions of er-gym have added fields.
 
     Attributes:
         added: the names of these fields. Where one has its default, the record is written without
