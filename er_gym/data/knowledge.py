@@ -1,4 +1,4 @@
-"""What the agent could know at a turn: all that a thought may be made of or is checked against.
+"""What the agent can know at a turn: writers compose thoughts from it, the critic checks them.
 
 :func:`knowledge_at` reads it from the trajectory's turns alone, so that a thought can be written
 and checked while the episode is played, and checked again from the records.

@@ -1,4 +1,4 @@
-"""What an agent perceives in few words, for models without pictures.
+"""The objects that an agent perceives as a short text, for models without vision.
 
 ``see CounterTop ( Apple, Mug away ), Fridge closed``: things in brackets lie in or on the thing
 before them. The words are a dialect's (:mod:`er_gym.data.dialects`).
@@ -82,10 +82,10 @@ class SceneWords(BaseModel):
 
 
 class NamedWords(BaseModel):
-    """The words for how far the things are that the instruction names, told after the scene.
+    """The words for where the instruction's objects are; the line comes after the scene.
 
-    A small model learns slowly to look a name up in a long list, and quickly to repeat what was
-    said of it last.
+    A small model learns slowly to look a name up in a long list, and quickly to copy the last line
+    about it.
 
     Attributes:
         told: tells them, ``{things}``.
@@ -136,8 +136,9 @@ class _Thing:
 def scene_text(words: SceneWords, now: Perceived, before: Perceived | None, *, stayed: bool) -> str:
     """What an agent perceives, in lines.
 
-    Objects that would be told alike are told once. After an action on the spot only things that are
-    new or changed are told; after any other, all that are in view, unless nothing has changed.
+    Objects with the same description are listed once. After an action on the spot, only new or
+    changed objects are listed; after any other action all objects in view, unless nothing has
+    changed.
 
     Args:
         words: the dialect's.
@@ -176,7 +177,7 @@ def scene_text(words: SceneWords, now: Perceived, before: Perceived | None, *, s
 
 
 def named_text(words: NamedWords, named: Sequence[str], now: Perceived) -> str:
-    """How far some types are, in a line; ``""`` for none."""
+    """Where objects of some types are, in one line; ``""`` if no type is given."""
     nearest: dict[str, SeenObject] = {}
     for each in (*now.view, *(one for view in now.views.values() for one in view)):
         nearest.setdefault(each.type, each)
