@@ -59,7 +59,7 @@ class ModelSettings(StrictSettings):
 
 
 class DataSettings(StrictSettings):
-    """What is learnt from.
+    """The training data.
 
     Attributes:
         parts: of a collection; all if empty.
@@ -97,7 +97,7 @@ class DataSettings(StrictSettings):
         return self
 
     def takes(self, part: str, kind: str) -> bool:
-        """Whether a trajectory of this part and kind is learnt from."""
+        """Whether a trajectory of this part and kind is used."""
         return (not self.parts or part in self.parts) and (not self.kinds or kind in self.kinds)
 
     def check_choice(self, where: str, trajectories: Iterable[Trajectory]) -> None:
@@ -125,7 +125,7 @@ class DataSettings(StrictSettings):
 
 
 class TrainingSettings(StrictSettings):
-    """How it is learnt: parameters of transformers' ``TrainingArguments``, with their meaning.
+    """How the model is trained: parameters of transformers' ``TrainingArguments``.
 
     Attributes:
         learning_rate, epochs, weight_decay, max_grad_norm: as there.

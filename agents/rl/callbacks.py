@@ -139,7 +139,7 @@ class TrackerWriter(KVWriter):
     def write(
         self, key_values: dict[str, Any], key_excluded: dict[str, Any], step: int = 0
     ) -> None:
-        """Keep the values until they are certain."""
+        """Keep the values until a checkpoint holds them."""
         values = {key: float(value) for key, value in key_values.items() if _is_number(value)}
         self._waiting.append({**values, "steps": step})
 

@@ -99,8 +99,8 @@ class Phase(StrictSettings):
 
 
 class Practice(StrictSettings):
-    """Rounds of DAgger after cloning: the policy plays, the searcher says what it would have done,
-    and the policy is fitted to all that has been gathered (:mod:`agents.rl.practice`).
+    """Rounds of DAgger after cloning: the policy plays, the searcher labels each step, and the
+    policy is fitted to all data gathered so far (:mod:`agents.rl.practice`).
 
     Attributes:
         rounds: how many.

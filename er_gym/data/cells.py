@@ -70,9 +70,10 @@ def cells_of(perception: Perception) -> tuple[tuple[str, ...], str]:
 
 
 def on_grid(cells: str, rows: int, columns: int) -> list[int]:
-    """What stands for each square of another grid, row by row: an index into ``covers``.
+    """The label of each square of another grid, row by row: an index into ``covers``.
 
-    Of the squares that overlap with it, the thing that covers the fewest squares of the picture.
+    Among the labels of the overlapping squares, it is the one with the fewest squares in the
+    picture.
     """
     count = Counter(cells)
     count[SYMBOLS[0]] = len(cells) + 1  # the room comes last

@@ -77,8 +77,7 @@ class Chat:
 
 
 def trained_prefixes(chat: Chat) -> Iterator[Chat]:
-    """For each turn that gets loss, the conversation up to it, in which only this turn gets
-    loss."""
+    """For each turn with loss, the conversation up to it, in which it alone gets loss."""
     for place, turn in enumerate(chat.turns):
         if turn.train:
             before = (replace(each, train=False) for each in chat.turns[:place])

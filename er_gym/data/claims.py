@@ -59,8 +59,7 @@ def unseen(thought: Thought) -> Iterator[Refusal]:
 
 
 def hidden(thought: Thought) -> Iterator[Refusal]:
-    """States as a fact where an object is that was never in view, or what an unopened container
-    holds."""
+    """States where an object is that was never in view, or what an unopened container holds."""
     phrases = thought.phrases
     for clause in thought.clauses:
         if clause.guessed or clause.negated:
@@ -202,8 +201,7 @@ def state(thought: Thought) -> Iterator[Refusal]:
 
 
 def hand(thought: Thought) -> Iterator[Refusal]:
-    """Claims to hold an object that the agent does not hold, or an empty hand while it holds
-    one."""
+    """Claims to hold an object that it does not hold, or an empty hand while it holds one."""
     phrases, held = thought.phrases, thought.known.held
     truth = f"the agent holds {held}" if held else "the hand is empty"
     for clause, match in _denials(thought, phrases.not_held):

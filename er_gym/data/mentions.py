@@ -149,8 +149,7 @@ def _plurals(name: str) -> Iterator[str]:
 
 @cache
 def alike(object_type: str) -> frozenset[str]:
-    """The types that count as one in a thought: a Sink and its SinkBasin, an Egg and its
-    EggCracked."""
+    """The types that count as one: a Sink and its SinkBasin, an Egg and its EggCracked."""
     others = {other for other in OBJECT_TYPES if same_type(object_type, other)}
     whole = object_type.removesuffix("Sliced").removesuffix("Cracked")
     others |= {whole, f"{whole}Sliced", f"{whole}Cracked"} & {*OBJECT_TYPES}

@@ -218,8 +218,8 @@ class EventLog:
             listener(event)
 
     def append(self, events: Iterable[Event]) -> None:
-        """Append events that happened elsewhere. The listeners are not called: they get only the
-        events of their own process."""
+        """Append events of another process; listeners are not called, as they get only their
+        own."""
         for event in events:
             with contextlib.suppress(OSError):
                 self._lines.add(event.model_dump_json())

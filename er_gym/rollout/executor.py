@@ -149,8 +149,7 @@ class EpisodeSettings:
         return episode_seed(self.manifest.seed, task.id) if own is None else own
 
     def unbegun(self, task: Task, error: str) -> EpisodeRecord:
-        """The record of an episode that crashed before its environment had reported the step
-        limit."""
+        """The record of an episode that crashed before the step limit was known."""
         return record_episode(
             task,
             agent=self.manifest.agent,

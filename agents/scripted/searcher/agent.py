@@ -126,7 +126,7 @@ class SearcherAgent:
         return Decision(action, self._thought)
 
     def watch(self, action: Action, info: Mapping[str, Any]) -> None:
-        """See another agent decide, before the first :meth:`act`: it will go on from there.
+        """Take in a step of another agent; the first :meth:`act` continues from there.
 
         Args:
             action: what the other agent does next.

@@ -1,4 +1,4 @@
-"""One server of a model: its address, its connections, its pace, and whether it is there."""
+"""One server of a model: its address, connections, rate limit and health checks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The servers of one model: who gets a request, who is set aside, and who is back.
+"""The servers of one model: which gets a request, and which are set aside or used again.
 
 A request goes to the server with the fewest requests under way. A server that gives no answer, or
 fails with 5xx, is set aside and asked for its list of models now and then. If it answers, one

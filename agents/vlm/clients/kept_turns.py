@@ -1,4 +1,4 @@
-"""Keeps what a model has computed for the earlier turns of conversations, for their next turns.
+"""Caches keys and values of the earlier turns of conversations, for their next turns.
 
 What a transformer computes for a token are a key and a value in each layer; later tokens need
 nothing else of it. A turn of a conversation repeats all turns before it, so their keys and values
