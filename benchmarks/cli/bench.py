@@ -98,7 +98,7 @@ class BenchOptions(OptionGroup):
     track: tuple[str, ...] = option(
         multiple=True,
         type=click.Choice(TRACKERS),
-        help="Log the run's figures for this program too; may be repeated.",
+        help="Also log the run's figures in the format of this program; may be repeated.",
     )
     seed: int = shared(seed_option)
     backend: str | None = option(help="The engine: embedded or unity.  [default: the suite's]")

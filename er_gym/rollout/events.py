@@ -218,8 +218,7 @@ class EventLog:
             listener(event)
 
     def append(self, events: Iterable[Event]) -> None:
-        """Append events of another process; listeners are not called, as they get only their
-        own."""
+        """Append events of another process, without calling the listeners."""
         for event in events:
             with contextlib.suppress(OSError):
                 self._lines.add(event.model_dump_json())
