@@ -197,8 +197,8 @@ def correction_strata(
         tasks: the tasks of the run's suite.
         run_directory: the run.
         limit: how many trajectories in all; None for as many as there are.
-        after: after which action somebody takes over.
-        by: who takes over.
+        after: the action after which another agent takes over.
+        by: the agent that takes over.
 
     Returns:
         The candidates, all in the part :data:`CORRECTIONS`; and how many episodes cannot be

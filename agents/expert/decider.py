@@ -121,7 +121,7 @@ class Deciders:
     Attributes:
         factory: makes the agents that ask it.
         prompts: the texts of the hint.
-        hint: whether the model is told the task's key actions.
+        hint: whether the model gets the task's key actions as a hint.
         strict: whether the critic must accept every thought.
     """
 

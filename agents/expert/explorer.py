@@ -101,7 +101,7 @@ class ExplorerCourse(TaskCourse):
             yield from self._visit(places[0], leg, tuple(places))
 
     def _stray(self, leg: Leg) -> Intents:
-        """Go to an unlikely place, and perhaps end the episode there, as ``GiveUp``."""
+        """Go to an unlikely place, and with some probability give up the episode there."""
         weighted = [(place, 1.0) for place, _ in candidates(leg.thing, self.view.navigable)]
         for place in draw_places(weighted, 1, self._random):
             yield from self._visit(place, leg, (place,))

@@ -19,7 +19,7 @@ def replayed_intent(
 
     Args:
         action: what was done.
-        view: what the environment told before.
+        view: the environment's answer before the action.
         legs: of the task.
         train: whether the turn is to be learnt from.
         again: whether the same action has just been refused.

@@ -44,7 +44,7 @@ class Progress:
         update, updates: how many are done, and of how many.
         loss: the mean over the learnt tokens since the last report.
         tokens_per_second: of all devices, since the last report.
-        seconds_left: as far as that tells.
+        seconds_left: estimated from the time per update since the last report.
         memory: bytes in use (:func:`agents.finetune.machine.used_memory`).
     """
 

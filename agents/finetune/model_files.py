@@ -3,8 +3,8 @@
 A model directory is what ``save_pretrained`` writes, a whole model or an adapter, with tokenizer,
 chat template and, for pictures, the image processor. Those that er-gym trained have two files more:
 
-- ``agent.yaml``: how the model was taught to converse, as settings of a model agent;
-- ``finetune_history.json``: the stages that it has been through.
+- ``agent.yaml``: the form of the training conversations, as settings of a model agent;
+- ``finetune_history.json``: the runs in which it was trained.
 """
 
 from __future__ import annotations

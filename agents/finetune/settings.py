@@ -70,8 +70,9 @@ class DataSettings(StrictSettings):
         mask: ``turns``: the turns that the trajectories mark ``train`` get loss, so that in the
             third stage the faulty step and all before it get none, as the paper describes.
             ``released``: all turns after the first ``<|feedback|>`` get loss, and if there is none,
-            all; so does the paper's released code. ``all``: as ``turns``, and all that the
-            assistant is told, without pictures; a model from random weights learns faster so.
+            all; so does the paper's released code. ``all``: as ``turns``, and the text of the
+            system's and user's messages, without pictures; a model from random weights learns
+            faster so.
         max_length: the most tokens of a conversation. A longer one is an error: to cut it would cut
             pictures.
         min_pixels, max_pixels: a picture with fewer or more is scaled.

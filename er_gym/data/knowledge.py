@@ -36,7 +36,7 @@ class Visit:
 
 @dataclass(frozen=True)
 class LastAction:
-    """The action before this turn and what came of it.
+    """The action before this turn and its result.
 
     Attributes:
         action, success, feedback, fault: as :class:`~er_gym.data.trajectory.Turn` has them.

@@ -51,7 +51,7 @@ class Clause:
 
     @property
     def guessed(self) -> bool:
-        """Whether it claims nothing about how things are."""
+        """Whether it makes no claim about the present state."""
         return self.asks or self.hedged or self.conditional or self.usual
 
     @property

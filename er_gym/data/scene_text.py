@@ -1,6 +1,6 @@
 """The objects that an agent perceives as a short text, for models without vision.
 
-``see CounterTop ( Apple, Mug away ), Fridge closed``: things in brackets lie in or on the thing
+``see CounterTop ( Apple, Mug away ), Fridge closed``: objects in brackets lie in or on the object
 before them. The words are a dialect's (:mod:`er_gym.data.dialects`).
 """
 
@@ -54,14 +54,14 @@ class SceneWords(BaseModel):
     """The words for what is perceived.
 
     Attributes:
-        view: tells the things in view, ``{things}``; ``around``: those seen by looking around, of
-            which none is within reach;
-            ``other``: the types, not told otherwise, that one can navigate to from now on.
-        held: tells what is in the hand, ``{things}``.
-        same: told after an action that has changed nothing of this. ``nothing``: stands where no
-            thing is in view.
-        away: not within reach. ``far``: not even close enough to navigate to. Things without either
-            are within reach.
+        view: lists the objects in view, ``{things}``; ``around``: those seen by looking around, of
+            which none is within reach; ``other``: the types, not listed otherwise, that the agent
+            can navigate to from now on.
+        held: states the object in the hand, ``{things}``.
+        same: used after an action that changed nothing of this. ``nothing``: used if no object is
+            in view.
+        away: not within reach. ``far``: not even close enough to navigate to. Objects without
+            either are within reach.
         open, closed, on, off: states.
     """
 
@@ -88,9 +88,9 @@ class NamedWords(BaseModel):
     about it.
 
     Attributes:
-        told: tells them, ``{things}``.
+        told: lists them, ``{things}``.
         held, near, view, hidden: in the hand, within reach, in view, and not in view.
-        at: told of a thing in view that lies in or on another, ``{place}``.
+        at: for an object in view that lies in or on another, ``{place}``.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -56,7 +56,7 @@ class RunBegun(_Event):
 
 
 class EpisodeBegun(_Event):
-    """The agent has been placed in a scene and told its task.
+    """The agent has been placed in a scene and has got its task.
 
     Attributes:
         max_steps: the step limit; placing the agent counts as the first step.
@@ -233,8 +233,8 @@ def read_events(directory: Path, kinds: Sequence[str] = ()) -> Iterator[Event]:
 
     Args:
         directory: the run directory.
-        kinds: no others are wanted, such as ``"episode_ended"``; most events are steps, and to
-            parse them takes most of the time.
+        kinds: yield only events of these kinds, such as ``"episode_ended"``, which is faster: most
+            events are steps. Empty for all kinds.
     """
     try:
         data = (directory / EVENTS).read_bytes()

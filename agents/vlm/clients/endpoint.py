@@ -74,7 +74,7 @@ class Endpoint:
             return error
 
     def is_up(self, request: Request) -> bool:
-        """Whether the server answers a request for its models, be it with a refusal."""
+        """Whether the server answers a request for its models, even with a refusal."""
         self.transport.begin_try(request, self._look)
         try:
             self._sdk.get("/models", cast_to=httpx2.Response, options=self._options)

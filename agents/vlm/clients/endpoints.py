@@ -5,8 +5,8 @@ fails with 5xx, is set aside and asked for its list of models now and then. If i
 request is sent to it on trial; a reply puts it back in use. A server that asks to wait is set aside
 for that time. A server that refuses every request is set aside for good.
 
-While all of them are set aside, requests are sent all the same, with the waits and tries that a
-single server gets. A single server is never set aside.
+While all of them are set aside, requests are still sent, with the waits and tries of a single
+server. A single server is never set aside.
 """
 
 from __future__ import annotations
