@@ -35,7 +35,7 @@ class Cause:
     Attributes:
         name: in records.
         means: what happened; follows "of 20 replies" or "of 20 episodes" in a sentence.
-        do: what the user can do, in words after a colon.
+        do: what the user can do; follows a colon in the sentence.
         settings: the agent's settings that decide it, by path.
     """
 

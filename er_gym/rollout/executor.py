@@ -83,8 +83,8 @@ class Parallelism:
         concurrency: the number of episodes at once, at least 1, for executors that play several
             episodes in one process.
         deadline: seconds within which an environment in another process must answer. The time
-            includes the wait for the other environments of that process. The process is killed
-            after it.
+            includes the wait for the other environments of that process. When it is over, the
+            process is killed.
         machines: where the worker processes run.
 
     Raises:
