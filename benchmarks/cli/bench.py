@@ -233,7 +233,7 @@ def _left_in(out: Path, chosen: Sequence[Task], samples: int, *, says_how: bool 
 
 
 def _print_causes(out: Path) -> None:
-    """Say what was amiss with the agent's replies in a run that ended early."""
+    """Print the causes of unusable replies in a run that ended early."""
     from benchmarks.scoring.report import load_run
     from er_gym.rollout.run_directory import MANIFEST
 

@@ -36,7 +36,7 @@ class EpisodeRow:
         steps, reward, seconds: so far.
         tokens, cost: of the model's replies that were not cached, cost in US dollars.
         last: the last action.
-        causes: what was amiss with its replies; None while it plays.
+        causes: of its unusable replies; None while it plays.
         before: while it is played again, the result that it had: it had crashed.
     """
 

@@ -43,7 +43,7 @@ class Decision:
             ignores it.
         reply: the cost of the model's reply, if the agent asks a model.
         by: who decided in place of the agent; ``""`` if nobody did.
-        causes: what was amiss with the reply, by names of :data:`er_gym.rollout.causes.CAUSES`.
+        causes: why the reply was not usable, by names of :data:`er_gym.rollout.causes.CAUSES`.
     """
 
     action: Action | str | int
