@@ -1,1 +1,1 @@
-"""The expert: it knows where things are, acts as if it had to search, and says why."""
+"""The expert: it knows where objects are, acts as if it had to search, and writes thoughts."""

@@ -20,7 +20,7 @@ def steps_of(episode: EpisodeRecord) -> list[StepRecord]:
 
 @dataclass(frozen=True)
 class PlayedCourse:
-    """What was done in an episode, as far as it decides whether it is taken.
+    """The facts of an episode that decide whether its trajectory is taken.
 
     Attributes:
         kind, mode: of the trajectory.

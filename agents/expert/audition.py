@@ -35,7 +35,7 @@ _MOST_AT_ONCE = 60
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came of an audition.
+    """The result of an audition.
 
     Attributes:
         candidate: the candidate; a correction has the beginning that it corrects now.
@@ -56,7 +56,7 @@ def audition(
     workers: int,
     machines: Machines = THIS_MACHINE,
 ) -> Iterator[Verdict]:
-    """Play candidates silently in worker processes; yields the verdicts as they come.
+    """Play candidates without thoughts in worker processes; yields each verdict when it is known.
 
     Args:
         candidates: of one part.
@@ -94,7 +94,7 @@ def _room(job: Sequence[Candidate]) -> str:
 
 
 class SilentAgent:
-    """Does what a course decides; for episodes of which only the actions are wanted."""
+    """Does what a course decides, without thoughts, where only the actions are needed."""
 
     obs_mode = "objects"
 

@@ -71,7 +71,7 @@ class Candidate:
 
     @property
     def said_actor(self) -> str:
-        """Who decides, as trajectories name it."""
+        """The name of the actor, as trajectories store it."""
         return f"{self.actor}:{self.explorer}" if self.explorer else self.actor
 
     def course(
@@ -118,7 +118,7 @@ class Candidates(Protocol):
 
 @dataclass(frozen=True)
 class FixedCandidates:
-    """Candidates that are there already."""
+    """A finite list of candidates."""
 
     candidates: Sequence[Candidate]
 

@@ -109,12 +109,12 @@ class Stratum:
 
     @property
     def missing(self) -> int:
-        """How many are neither taken nor to be played."""
+        """How many candidates must still be chosen to fill the quota."""
         return self.quota - len(self.taken) - len(self.chosen)
 
     @property
     def open(self) -> bool:
-        """Whether there are more candidates to look at."""
+        """Whether there are more candidates to try."""
         exhausted = self.sequence.length is not None and self.looked_at >= self.sequence.length
         given_up = max(self.fruitless, self.in_vain) >= _FRUITLESS_ROUNDS
         return self.missing > 0 and not given_up and not exhausted
@@ -146,7 +146,7 @@ class Stratum:
         self.fruitless = 0 if more else self.fruitless + 1
 
     def take(self, fit: Sequence[Candidate]) -> None:
-        """Take those of the chosen that were played and are fit; the others are given up."""
+        """Take the chosen candidates that were played and are accepted; drop the others."""
         if self.chosen:
             self.in_vain = 0 if fit else self.in_vain + 1
         self.taken += fit
@@ -197,8 +197,8 @@ def correction_strata(
         tasks: the tasks of the run's suite.
         run_directory: the run.
         limit: how many trajectories in all; None for as many as there are.
-        after: after which action somebody takes over.
-        by: who takes over.
+        after: the action after which another agent takes over.
+        by: the agent that takes over.
 
     Returns:
         The candidates, all in the part :data:`CORRECTIONS`; and how many episodes cannot be

@@ -1,4 +1,4 @@
-"""Failed episodes: where they leave the key actions."""
+"""The beginnings of failed episodes that are corrected, each up to a wrong action."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ class Course(Protocol):
     """Decides the actions of one episode.
 
     Attributes:
-        view: what the environment told last; it is set before each decision.
+        view: the environment's last answer; it is set before each decision.
     """
 
     view: View

@@ -39,8 +39,8 @@ MODEL = "model"
 class DecidingAgent:
     """Lets a vision-language agent decide and think, and records the trajectory.
 
-    The thoughts are the model's own, so what the critic has against them is recorded only. A turn
-    whose action was refused is not to be learnt from.
+    The thoughts are the model's own, so the critic's objections are only recorded. A turn whose
+    action was refused is not to be learnt from.
 
     Args:
         agent: decides.
@@ -120,9 +120,9 @@ class Deciders:
 
     Attributes:
         factory: makes the agents that ask it.
-        prompts: with the words of the hint.
-        hint: whether the model is told the task's key actions.
-        strict: whether every thought must stand before the critic.
+        prompts: the texts of the hint.
+        hint: whether the model gets the task's key actions as a hint.
+        strict: whether the critic must accept every thought.
     """
 
     factory: AgentFactory
@@ -132,7 +132,7 @@ class Deciders:
 
     @property
     def scripted(self) -> bool:
-        """Never: nobody knows what a model will decide."""
+        """False: a model's decisions are not known before it plays."""
         return False
 
     @property
@@ -163,7 +163,8 @@ class Deciders:
         return make_agent
 
     def rejection(self, trajectory: Trajectory, most_actions: int) -> str:
-        """What succeeds is taken, unless a turn has nothing to learn from."""
+        """Why a trajectory is not taken, ``""`` if it is: it must succeed, and every reply name an
+        action."""
         if not trajectory.success:
             return "no success"
         if trajectory.actions > most_actions:

@@ -1,4 +1,4 @@
-"""The expert's course: it knows where things are, and searches as if it did not."""
+"""The expert's course: it knows where objects are, and searches as if it did not."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ class ExpertCourse(TaskCourse):
 
 
 class CorrectedCourse(ExpertCourse):
-    """Repeats the beginning of a failed episode up to a wrong action, then does the rest rightly.
+    """Repeats the beginning of a failed episode up to a wrong action, then does the task correctly.
 
     Args:
         task: the task.

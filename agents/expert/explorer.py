@@ -1,4 +1,4 @@
-"""An explorer's course: it does not know where things are, and searches likely places."""
+"""An explorer's course: it does not know where objects are, and searches likely places."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class Strength(BaseModel):
         share: of the trajectories that explorers of this strength play.
         temperature: 0 goes to the likeliest place first; larger is more random.
         forgets: the share of places visited that it may visit again.
-        blunders: the share of searches and actions at which it does something wrong: it goes to an
-            unlikely place, takes another object, forgets to open a container, or ends too early.
+        blunders: the probability of a mistake at each search and action: it goes to an unlikely
+            place, takes another object, forgets to open a container, or ends too early.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -49,12 +49,12 @@ class Strength(BaseModel):
 class ExplorerCourse(TaskCourse):
     """Searches places by their likelihood until the object is in view.
 
-    It knows what is to be done, but not where things are.
+    It knows the goal of the task, but not where objects are.
 
     Args:
         task: the task.
         strength: how well it plays.
-        random: draws places and blunders.
+        random: draws places and mistakes.
         check: how the task ends.
         must_search: whether the episode ends at once if the first thing to be searched for is in
             view from the beginning, since nothing is explored then.
@@ -101,7 +101,7 @@ class ExplorerCourse(TaskCourse):
             yield from self._visit(places[0], leg, tuple(places))
 
     def _stray(self, leg: Leg) -> Intents:
-        """Go to an unlikely place, and perhaps lose heart there."""
+        """Go to an unlikely place, and with some probability give up the episode there."""
         weighted = [(place, 1.0) for place, _ in candidates(leg.thing, self.view.navigable)]
         for place in draw_places(weighted, 1, self._random):
             yield from self._visit(place, leg, (place,))

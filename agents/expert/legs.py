@@ -35,7 +35,7 @@ class Leg:
 
     @property
     def subgoal(self) -> Subgoal:
-        """What the agent is after on its way there."""
+        """The agent's goal on the way to the place."""
         return self.subgoals[0]
 
     @property
@@ -86,7 +86,7 @@ def keys_left(legs: Sequence[Leg], left: Collection[KeyAction]) -> tuple[tuple[i
 
 
 def at_hand(legs: Sequence[Leg], left: Collection[KeyAction]) -> tuple[Leg, Subgoal] | None:
-    """The leg that an agent is at by what is done, and what it is after; None without legs.
+    """The leg that follows from the key actions done, and the agent's goal; None without legs.
 
     Opening and closing serve another action, so an agent that has only forgotten to close
     something is at the next leg. When all is done it is at the last.

@@ -1,4 +1,4 @@
-"""Wrong places that a model names, as the paper has them: plausible, and without probabilities."""
+"""Plausible wrong places named by a model, as in the paper, instead of drawn by likelihood."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The thoughts of a model's replies in a run, with their kinds: its own words."""
+"""The thoughts in the replies of a model that played a run, with their kinds."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class OwnWords:
 
     Attributes:
         turns: one for each reply.
-        language: in which it was spoken to.
+        language: of its prompts.
         tokens: the length of the whole conversation, in the model's tokens; 0 if unknown.
     """
 
@@ -57,7 +57,7 @@ class OwnWords:
 
     @property
     def silent(self) -> bool:
-        """Whether it thought nothing anywhere, as a model does that was trained on actions."""
+        """Whether no reply has a thought, as with a model that was trained on actions alone."""
         return not any(turn.thoughts for turn in self.turns)
 
 
@@ -121,8 +121,8 @@ def split_speech(text: str, dialect: str, language: Language) -> list[tuple[Thou
     """Running speech as thoughts: each begins with an opener of its kind.
 
     The openers, and the closer at the end, are the dialect's words and not the model's thought, so
-    they are left out; the dialect says them again. What comes before the first opener has no kind
-    of its own and counts as spatial reasoning.
+    they are left out; an export adds new ones. What comes before the first opener has no kind of
+    its own and counts as spatial reasoning.
 
     Args:
         text: a reply without its decision.

@@ -22,7 +22,7 @@ _ONLY_FOR_SMALL = frozenset({"GarbageCan", "LaundryHamper", "Box", "Toilet", "To
 def candidates(
     thing: str, navigable: Iterable[str], without: Iterable[str] = ()
 ) -> list[tuple[str, float]]:
-    """The places in which a person may look for an object, with a weight each.
+    """The places where a person would search for an object, each with a weight.
 
     Args:
         thing: the type of the object.
@@ -48,7 +48,7 @@ def candidates(
 def draw_places(
     weighted: Sequence[tuple[str, float]], number: int, random: Random, temperature: float = 1.0
 ) -> list[str]:
-    """Different places, the likelier the more often and the earlier.
+    """Different places, drawn by weight: likelier places are drawn more often, and come earlier.
 
     Args:
         weighted: places with their weights.
@@ -99,7 +99,7 @@ class DrawnPlaces:
         return draw_places(weighted, number, random)
 
     def take_replies(self) -> Sequence[ModelReply]:
-        """None: no model is asked."""
+        """Empty: no model is asked."""
         return ()
 
 

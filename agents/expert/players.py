@@ -49,8 +49,8 @@ class Players(Protocol):
 
     @property
     def scripted(self) -> bool:
-        """Whether the agents do what the candidates' courses decide, so that an audition shows how
-        their episodes come out."""
+        """Whether the agents do what the candidates' courses decide, so that an audition shows the
+        results of their episodes."""
 
     def make(
         self, candidates: Mapping[str, Candidate], settings: PlaySettings, most_actions: int
@@ -69,7 +69,7 @@ class Players(Protocol):
 
 @dataclass(frozen=True)
 class Thinkers:
-    """Agents that follow scripted courses and write down why; :class:`Players`.
+    """Agents that follow scripted courses and write thoughts; :class:`Players`.
 
     Attributes:
         make_writer: makes the writer of thoughts; picklable for processes.
@@ -117,7 +117,7 @@ class Thinkers:
 
 
 def header_of(candidate: Candidate, settings: PlaySettings) -> TrajectoryHeader:
-    """What the trajectory of a candidate says of itself."""
+    """The header of a candidate's trajectory."""
     correction = None
     if candidate.beginning is not None:
         correction = Correction(

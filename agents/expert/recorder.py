@@ -48,7 +48,7 @@ FOLDERS = (PICTURES, PLAYED)
 
 @dataclass(frozen=True)
 class TrajectoryHeader:
-    """What a trajectory says of itself before it begins.
+    """The fields of a trajectory that are known before the episode begins.
 
     Attributes:
         task_id, part, kind, mode, language, actor, correction: as
@@ -106,7 +106,7 @@ class TrajectoryRecorder:
         self._cost = Cost()
 
     def take_result(self, info: Mapping[str, Any]) -> None:
-        """Note what came of the last action."""
+        """Record the result of the last action."""
         earned = info["key_actions_done"] > self._done
         self._done = info["key_actions_done"]
         if not self.turns:
@@ -151,13 +151,13 @@ class TrajectoryRecorder:
         self.turns.append(turn)
 
     def knowledge(self, index: int) -> Knowledge:
-        """What is known at a turn, given the thoughts of the turns before."""
+        """What the agent knows at a turn, with the thoughts of the turns before."""
         return knowledge_at(
             self.turns, index, instruction=self._task.instruction, language=self._header.language
         )
 
     def think(self, index: int, thoughts: Iterable[ThoughtRecord]) -> None:
-        """Give a turn its thoughts."""
+        """Set the thoughts of a turn."""
         self.turns[index] = self.turns[index].model_copy(update={"thoughts": list(thoughts)})
 
     def think_own(
@@ -167,7 +167,7 @@ class TrajectoryRecorder:
         writer: str,
         limits: Mapping[ThoughtKind, int],
     ) -> list[ThoughtRecord]:
-        """Give a turn the thoughts of who decided it; the critic's refusals are only recorded.
+        """Set a turn's thoughts by the agent that decided it; refusals are only recorded.
 
         Args:
             index: of the turn.
@@ -185,7 +185,7 @@ class TrajectoryRecorder:
         return records
 
     def pay(self, replies: Iterable[ModelReply]) -> None:
-        """Add what replies cost; those from the cache too, which an earlier try paid for."""
+        """Add the cost of replies, including cached ones, which an earlier try paid for."""
         for reply in replies:
             self._cost = Cost(
                 requests=self._cost.requests + 1,

@@ -42,8 +42,8 @@ CRITIC = "the critic refuses a thought"
 class ReplayedCourse:
     """Does the actions of an episode again; :class:`~agents.expert.course.Course`.
 
-    Why the agent took an action is read from the task and from what it held: nobody recorded it.
-    A turn whose action failed is not to be learnt from.
+    The reason for an action was not recorded; it is inferred from the task and the held object. A
+    turn whose action failed is not to be learnt from.
 
     Args:
         task: the task.
@@ -56,7 +56,7 @@ class ReplayedCourse:
         self._legs, self._steps = legs_of(task), steps
 
     def intents(self) -> Iterator[Intent]:
-        """The decisions; after the last of the episode ``end``, should the replay go on."""
+        """The decisions; after the last of the episode ``end``, if the replay is not over then."""
         failed: Action | None = None
         for step in self._steps:
             action = Action(step.verb, step.object_type)
@@ -69,9 +69,9 @@ class ReplayedCourse:
 
 
 class QuotingAgent:
-    """Does what an episode's agent did, and records what it thought, in its own words.
+    """Repeats the actions of an episode's agent, and records its own thoughts.
 
-    The critic reads the thoughts; what it has against them is recorded and changes nothing.
+    The critic checks the thoughts; its objections are recorded and change nothing.
 
     Args:
         course: decides.
@@ -106,7 +106,7 @@ class QuotingAgent:
         self._intents: Iterator[Intent] | None = None
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
-        """The episode's next action, with what was thought before it."""
+        """The episode's next action, with the thoughts before it."""
         recorder = self._recorder
         assert recorder is not None
         recorder.take_result(info)

@@ -1,4 +1,4 @@
-"""Why somebody may have taken an action: nobody recorded it, so it is read from the task."""
+"""Infers the reason for an action of a recorded episode from the task."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from er_gym.tasks.equivalence import same_type
 def replayed_intent(
     action: Action, view: View, legs: Sequence[Leg], *, train: bool, again: bool = False
 ) -> Intent:
-    """The intent that an action seems to have.
+    """The probable intent of an action.
 
     Args:
         action: what was done.
-        view: what the environment told before.
+        view: the environment's answer before the action.
         legs: of the task.
         train: whether the turn is to be learnt from.
         again: whether the same action has just been refused.
@@ -44,12 +44,12 @@ def replayed_intent(
 
 
 def replayed_purpose(action: Action, held: str, place: str = "") -> Purpose:
-    """Why somebody may have taken an action.
+    """The probable reason for an action.
 
     Args:
         action: what was done.
         held: the type of the held object, ``""`` for none.
-        place: the type of where it goes; ``""`` if nobody knows.
+        place: the type of where it goes; ``""`` if it is unknown.
     """
     brings = bool(held) and (not place or same_type(action.object_type, place))
     if action.verb == verbs.NAVIGATE:

@@ -1,8 +1,8 @@
 """Rejection sampling: which episodes of earlier runs become trajectories.
 
 As in the paper's second stage (arXiv 2503.21696), each task is played several times
-(``er-gym bench --samples``), and what succeeds is kept. Success is what the environment said and
-what its judge says again from the record.
+(``er-gym bench --samples``), and successful episodes are kept. An episode is a success if the
+environment said so and its judge confirms it from the record.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class SelectionRules:
 
 @dataclass
 class TypeYield:
-    """What became of the samples of one task type.
+    """The numbers of samples of one task type that were played, successful and kept.
 
     Attributes:
         tasks: how many tasks were played, and ``solved``: of how many a sample succeeded.
@@ -115,7 +115,7 @@ class Screening:
 def screen(
     runs: Sequence[RunDirectory], tasks: Iterable[Task], rules: SelectionRules, seed: int
 ) -> Screening:
-    """Look through the episodes of some runs, one at a time, for those that may be taken.
+    """Find the episodes of some runs that may be taken; they are read one at a time.
 
     Memory grows by some hundred bytes for each success.
 

@@ -1,4 +1,4 @@
-"""The searcher takes over a failed episode: it has watched, and goes on with what is left to do."""
+"""The searcher takes over a failed episode: it knows what was seen, and does the rest."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class SearcherCourse:
     """Repeats the beginning of a failed episode, then lets the searcher finish the task.
 
     The searcher knows the instruction and what the episode has seen, as the failed agent did; it is
-    told which of its goals are done. :class:`~agents.expert.course.Course`.
+    also given the goals that are done. :class:`~agents.expert.course.Course`.
 
     Args:
         task: the task.

@@ -27,7 +27,7 @@ _TRIES = 5
 
 
 class GiveUp(Exception):
-    """The course cannot be finished as it was meant to; the episode ends."""
+    """The course cannot be finished as planned; the episode ends."""
 
 
 class TaskCourse:
@@ -35,9 +35,9 @@ class TaskCourse:
 
     Args:
         task: the task.
-        random: draws whatever is to be drawn.
+        random: makes all random choices.
         check: how the task ends.
-        retries: how often an action that the environment let fail is tried again.
+        retries: how often a failed action is tried again.
         repeats: the share of successful actions that are repeated without need.
         strict: whether the course is given up when it needs more than the key actions.
     """

@@ -1,4 +1,4 @@
-"""The agent that follows a course and says why: it leaves a trajectory beside its episode."""
+"""The agent that follows a course and writes thoughts: it records a trajectory of its episode."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class ThinkingAgent:
 
     Args:
         course: decides.
-        header: what the trajectory says of itself.
+        header: the fields of the trajectory that are known beforehand.
         kinds: which kinds of thoughts are drawn.
         writer: writes them.
         pictures: how pictures are encoded; None to record none.

@@ -1,4 +1,4 @@
-"""Which kinds of thoughts an agent has at a turn: a table of transitions, drawn from."""
+"""Draws the kinds of thoughts of a turn from a table of transitions."""
 
 from __future__ import annotations
 

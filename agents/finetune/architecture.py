@@ -1,4 +1,4 @@
-"""The architecture of a model that is made from nothing. Imports no model library.
+"""The architecture of a model with random weights. Imports no model library.
 
 er-gym's own files are ``configs/architectures/NAME.yaml``.
 """

@@ -1,4 +1,4 @@
-"""The token ``<|feedback|>``: a word of its own that the model did not have.
+"""The token ``<|feedback|>``, which is added to the model's vocabulary.
 
 The paper's released code gives it the id 151657, which on Qwen2.5 is ``<tool_call>``. Here it gets
 the next free id.

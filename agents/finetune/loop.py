@@ -44,7 +44,7 @@ class Progress:
         update, updates: how many are done, and of how many.
         loss: the mean over the learnt tokens since the last report.
         tokens_per_second: of all devices, since the last report.
-        seconds_left: as far as that tells.
+        seconds_left: estimated from the time per update since the last report.
         memory: bytes in use (:func:`agents.finetune.machine.used_memory`).
     """
 
@@ -112,7 +112,7 @@ def mean_loss(outputs: Any, labels: torch.Tensor, num_items_in_batch: Any = None
 class FinetuneTrainer(transformers.Trainer):
     """Transformers' trainer, with our order and loss, and checkpoints that are whole or not there.
 
-    A checkpoint holds the weights that learn, by their names in the model. Transformers' own would
+    A checkpoint holds the trained weights, by their names in the model. Transformers' own would
     hold them by the names of older versions, and those of Qwen2-VL and Qwen2.5-VL it does not read
     again: it would continue with the weights of the beginning, and say nothing (5.23).
     """

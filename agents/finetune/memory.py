@@ -131,7 +131,7 @@ class Plan:
     Attributes:
         precision: of the arithmetic.
         lora_rank: None for full fine-tuning.
-        freeze: parts that do not learn, as in the settings.
+        freeze: parts that are not trained, as in the settings.
         checkpointing: whether activations are computed again.
         batch: conversations at a time.
         tokens, learnt, patches: the most of a conversation: its tokens, those that get loss, and
@@ -197,7 +197,7 @@ def memory(model: ModelNumbers, plan: Plan) -> Memory:
 
 
 def trained_parameters(model: ModelNumbers, plan: Plan) -> int:
-    """How many parameters learn."""
+    """How many parameters are trained."""
     if plan.lora_rank is not None:
         return model.lora(plan.lora_rank)
     learnt = model.linear + model.embeddings

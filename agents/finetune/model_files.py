@@ -1,10 +1,10 @@
-"""A model directory as fine-tuning finds it: everything but the weights.
+"""Reads a model directory before fine-tuning: everything but the weights.
 
 A model directory is what ``save_pretrained`` writes, a whole model or an adapter, with tokenizer,
 chat template and, for pictures, the image processor. Those that er-gym trained have two files more:
 
-- ``agent.yaml``: how the model was taught to converse, as settings of a model agent;
-- ``finetune_history.json``: the stages that it has been through.
+- ``agent.yaml``: the form of the training conversations, as settings of a model agent;
+- ``finetune_history.json``: the runs in which it was trained.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _PROCESSOR = (
 
 
 class StageRecord(BaseModel):
-    """A fine-tuning run that a model has been through.
+    """A fine-tuning run in which a model was trained.
 
     Attributes:
         stage: the paper's stage; None for a run outside them.
@@ -68,7 +68,7 @@ class StageRecord(BaseModel):
 
 
 class History(BaseModel):
-    """All runs that a model has been through, the first one first."""
+    """All fine-tuning runs in which a model was trained, the first one first."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -195,7 +195,7 @@ def _agent(path: Path) -> Mapping[str, Any]:
 
 
 def check_stage(files: ModelFiles, after: Stage | None) -> None:
-    """Raise ValueError if the model has not been through a stage that has to come before."""
+    """Raise ValueError if the model was not trained in a stage that must come before."""
     been = files.history.stages
     if after is not None and after not in been:
         raise ValueError(
@@ -206,7 +206,7 @@ def check_stage(files: ModelFiles, after: Stage | None) -> None:
 
 
 def check_prompts(files: ModelFiles, prompts: Mapping[str, str]) -> None:
-    """Raise ValueError if the model was taught to converse in other words than the data's."""
+    """Raise ValueError if the model was tuned on another dialect or language than the data's."""
     known = files.agent.get("prompts")
     if isinstance(known, dict):
         for name, wanted in prompts.items():

@@ -1,4 +1,4 @@
-"""What is known of the models that people fine-tune: one YAML file each in ``configs/models``."""
+"""Facts about pretrained models that can be fine-tuned: a YAML file each in ``configs/models``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Makes a model from nothing: a tokenizer learnt from texts, random weights, and a processor.
+"""Makes a new model: a tokenizer trained on texts, random weights, and a processor.
 
 The directory is laid out as ``save_pretrained`` lays it out, so every program that loads such
 models loads it: a transformers architecture, a byte-level BPE tokenizer with Qwen's special tokens

@@ -1,4 +1,4 @@
-"""What is learnt from: conversations with pictures, whatever they are made of."""
+"""Training data: conversations with pictures, from collections, frames or ShareGPT files."""
 
 from __future__ import annotations
 

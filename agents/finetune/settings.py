@@ -59,7 +59,7 @@ class ModelSettings(StrictSettings):
 
 
 class DataSettings(StrictSettings):
-    """What is learnt from.
+    """The training data.
 
     Attributes:
         parts: of a collection; all if empty.
@@ -70,8 +70,9 @@ class DataSettings(StrictSettings):
         mask: ``turns``: the turns that the trajectories mark ``train`` get loss, so that in the
             third stage the faulty step and all before it get none, as the paper describes.
             ``released``: all turns after the first ``<|feedback|>`` get loss, and if there is none,
-            all; so does the paper's released code. ``all``: as ``turns``, and all that the
-            assistant is told, without pictures; a model from random weights learns faster so.
+            all; so does the paper's released code. ``all``: as ``turns``, and the text of the
+            system's and user's messages, without pictures; a model from random weights learns
+            faster so.
         max_length: the most tokens of a conversation. A longer one is an error: to cut it would cut
             pictures.
         min_pixels, max_pixels: a picture with fewer or more is scaled.
@@ -97,7 +98,7 @@ class DataSettings(StrictSettings):
         return self
 
     def takes(self, part: str, kind: str) -> bool:
-        """Whether a trajectory of this part and kind is learnt from."""
+        """Whether a trajectory of this part and kind is used."""
         return (not self.parts or part in self.parts) and (not self.kinds or kind in self.kinds)
 
     def check_choice(self, where: str, trajectories: Iterable[Trajectory]) -> None:
@@ -125,7 +126,7 @@ class DataSettings(StrictSettings):
 
 
 class TrainingSettings(StrictSettings):
-    """How it is learnt: parameters of transformers' ``TrainingArguments``, with their meaning.
+    """How the model is trained: parameters of transformers' ``TrainingArguments``.
 
     Attributes:
         learning_rate, epochs, weight_decay, max_grad_norm: as there.

@@ -1,4 +1,4 @@
-"""Conversations as tokens: those that the model will read when it plays, and which are learnt."""
+"""Conversations as tokens: the same as at play, and which of them get loss."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ class Result:
 
     Attributes:
         path: the run directory.
-        conversations, left_out: how many were learnt, and how many have nothing to be learnt.
+        conversations, left_out: how many were trained on, and how many have no turn with loss.
         updates: how many there were in all.
         first_loss, loss: the first and the last that were logged.
         new: whether anything was left to do.

@@ -1,8 +1,8 @@
-"""What the searcher would do next, whoever has acted until now. Imports no torch.
+"""Computes the searcher's next action after actions of another agent. Imports no torch.
 
-The searcher's plan is a generator that expects its own actions. When another acts, as a policy that
-is to learn from it does, the plan starts again from the subtask at hand, with the searcher's memory
-of all that has been seen and done.
+The searcher's plan is a generator that expects its own actions. When another agent acts, such as
+the policy that is to imitate it, the plan starts again from the current subtask, with the
+searcher's memory of everything that was seen and done.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from er_gym.thor.objects import TYPES
 
 
 class Adviser(SearcherAgent):
-    """The searcher, asked for its next action after each action of another.
+    """A searcher that gives its next action after each action of another agent.
 
-    It knows what the searcher knows: the instruction and what ``info`` tells every agent.
+    It knows what the searcher knows: the instruction, and the ``info`` that every agent gets.
     """
 
     def begin(self, task: Task, info: Mapping[str, Any], memory: SubtaskMemory) -> None:
@@ -37,7 +37,7 @@ class Adviser(SearcherAgent):
         self._times = 0
 
     def advise(self, info: Mapping[str, Any]) -> Action:
-        """The searcher's action after what ``info`` tells."""
+        """The searcher's next action, given the last step's ``info``."""
         done = action_of(info)
         if done is not None:
             self._times = self._times + 1 if done == self._done else 1
@@ -57,7 +57,7 @@ class Adviser(SearcherAgent):
         self._steps = self._rest(done)
 
     def _rest(self, done: Action | None) -> Steps:
-        """The subtasks that are left, beginning in the middle of the one at hand."""
+        """Do the remaining subtasks, beginning in the middle of the current one."""
         progress = self._subtask_memory.progress
         left = progress.subtasks[progress.number :]
         if left and done is not None and done.verb == verbs.NAVIGATE:
@@ -70,7 +70,7 @@ class Adviser(SearcherAgent):
         return True
 
     def _arrived(self, place: str, subtask: Subtask) -> Steps:
-        """Look into what is closed where the other has gone."""
+        """Open the closed container to which the other agent has navigated, and look inside."""
         verb = "" if subtask.verb == FIND else subtask.verb
         if subtask.verb not in (verbs.PUT, verbs.CLOSE) and not self._ready(subtask.thing, verb):
             yield from self._look_inside(place, subtask.thing, verb)

@@ -104,7 +104,7 @@ class BoardWriter(TensorBoardOutputFormat):
     Args:
         folder: of its files.
         steps: as :class:`CurveWriter` takes it. What was logged after these is void: TensorBoard
-            forgets it, as for a fine-tuning run.
+            drops it, as for a fine-tuning run.
     """
 
     def __init__(self, folder: Path, steps: int | None) -> None:
@@ -117,8 +117,9 @@ class BoardWriter(TensorBoardOutputFormat):
 class TrackerWriter(KVWriter):
     """Sends each logger dump to a tracker that takes a step once, when a checkpoint holds it.
 
-    What a killed run had learnt after its checkpoint is learnt again, and a tracker cannot forget
-    as ``curve.jsonl`` does. So nothing is sent before it is certain.
+    A run that was killed repeats the steps after its last checkpoint. Values that a tracker has got
+    cannot be removed, unlike lines of ``curve.jsonl``. So values are sent only once a checkpoint
+    covers their step.
 
     Args:
         send: takes values and the number of steps.
@@ -139,7 +140,7 @@ class TrackerWriter(KVWriter):
     def write(
         self, key_values: dict[str, Any], key_excluded: dict[str, Any], step: int = 0
     ) -> None:
-        """Keep the values until they are certain."""
+        """Keep the values until a checkpoint holds them."""
         values = {key: float(value) for key, value in key_values.items() if _is_number(value)}
         self._waiting.append({**values, "steps": step})
 

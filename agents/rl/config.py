@@ -31,8 +31,8 @@ class EnvConfig(StrictSettings):
         types: the task types, drawn with equal probability; all types if empty.
         obs_mode: ``state``, with ``rgb`` or ``depth`` or both before it. (``instance`` is not
             offered: its numbers only name objects, so a network cannot calculate with them.)
-        subtasks: whether the policy also observes which subtask of the instruction is at hand, and
-            where it has looked for it (:mod:`agents.rl.subtask_memory`).
+        subtasks: whether the policy also observes the current subtask of the instruction, and where
+            it has searched for its object (:mod:`agents.rl.subtask_memory`).
         instruction: the encoder of the instruction, as
             :func:`er_gym.envs.wrappers.make_encoder` has it; "" for none, since ``state`` says
             which types it names.
@@ -99,8 +99,8 @@ class Phase(StrictSettings):
 
 
 class Practice(StrictSettings):
-    """Rounds of DAgger after cloning: the policy plays, the searcher says what it would have done,
-    and the policy is fitted to all that has been gathered (:mod:`agents.rl.practice`).
+    """Rounds of DAgger after cloning: the policy plays, the searcher labels each step, and the
+    policy is fitted to all data gathered so far (:mod:`agents.rl.practice`).
 
     Attributes:
         rounds: how many.

@@ -116,8 +116,8 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
 
 
 class AdvisedEnv(gymnasium.Wrapper[Obs, Any, Obs, Any]):
-    """Adds to the observation of a :class:`LearningEnv` with subtasks what the searcher would do:
-    ``advice``, () int64, the index of its action."""
+    """Adds the action that the searcher would take to the observation of a :class:`LearningEnv`
+    with subtasks: ``advice``, () int64, the index of its action."""
 
     env: LearningEnv
 

@@ -135,7 +135,7 @@ def check_about(told: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
 
 
 def read_about(archive: zipfile.ZipFile) -> Any:
-    """What ``model.npz`` says of itself."""
+    """The metadata of ``model.npz``."""
     return json.loads(read_array(archive, ABOUT, _LONGEST_ABOUT).tobytes().decode())
 
 
@@ -196,7 +196,7 @@ def channels_first(space: spaces.Dict) -> spaces.Dict:
 
 
 def about(algorithm: str, sees: spaces.Dict, actions: int) -> dict[str, Any]:
-    """What a file says of the learner whose weights it holds."""
+    """What a file states about the learner whose weights it holds."""
     return {
         "format": FORMAT,
         "algorithm": algorithm,

@@ -1,4 +1,4 @@
-"""DAgger (Ross et al. 2011): the policy plays, and the searcher says what it would have done.
+"""DAgger (Ross et al. 2011): the policy plays, and the searcher labels each step.
 
 A cloned policy drifts into situations that its teacher never showed. Here the policy plays by
 itself, every situation that it gets into is kept with the searcher's action there, and the policy
@@ -31,7 +31,7 @@ def advised_envs(config: TrainConfig, seed: int) -> VecEnv:
 
 
 def practise(model: MaskablePPO, env: VecEnv, how: Practice, gamma: float) -> Demonstrations:
-    """Let the policy play, and note the searcher's advice at every step.
+    """Let the policy play, and record the searcher's action for every step.
 
     Args:
         model: chooses the actions, by their probabilities.

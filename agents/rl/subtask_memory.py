@@ -1,9 +1,9 @@
-"""The observation ``subtask``: the subtask at hand, and what the agent remembers of its search.
+"""The observation ``subtask``: the current subtask, and the agent's memory of its search.
 
-Everything in it follows from the instruction's words, from what ``info`` tells every agent, and
-from the agent's own actions. It adds to ``state`` what that leaves out: which of the named types is
-to be fetched and which is to receive it, what has been done already, and where the agent has looked
-since it began to search.
+Everything in it follows from the instruction, from the ``info`` that every agent gets, and from the
+agent's own actions. It contains what ``state`` lacks: which of the named types is to be fetched and
+which is the destination, the subtasks that are done, and the places searched since the search
+began.
 """
 
 from __future__ import annotations

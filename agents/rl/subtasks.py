@@ -1,4 +1,4 @@
-"""An instruction as a list of subtasks, and which of them is at hand.
+"""An instruction as a list of subtasks, and which of them is current.
 
 The subtasks come from the words of the instruction alone, read as the searcher reads them
 (:mod:`agents.scripted.searcher.instruction`). Which one is at hand follows from what the agent did
@@ -103,7 +103,7 @@ _SINGLE = {
 
 
 class Progress:
-    """Which subtask of an instruction is at hand.
+    """Which subtask of an instruction is current.
 
     Attributes:
         subtasks: all of them, in order.

@@ -29,7 +29,7 @@ def warm_start(
     seed: int,
     show_progress: bool = False,
 ) -> None:
-    """Clone the teacher, then practise; ``warm_start.json`` in ``run`` tells how it went."""
+    """Clone the teacher, then practise; ``warm_start.json`` in ``run`` holds the results."""
     told: dict[str, Any] = {}
     for told in _stages(model, config, how, seed):
         write_atomic(run / WARM_START, json.dumps(told))

@@ -28,4 +28,4 @@ class OracleAgent:
         return Decision(action, f"The next key action is {key.verb} {key.actual_type}.")
 
     def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-        """Nothing to remember: the key actions that are left say where it stands."""
+        """Do nothing: the oracle reads the remaining key actions anew at each step."""

@@ -25,11 +25,11 @@ class RandomAgent:
         self._random = np.random.default_rng(seed)
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-        """Nothing to prepare."""
+        """Do nothing: the agent needs no preparation."""
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """A random legal action."""
         return Decision(int(self._random.choice(np.flatnonzero(info["action_mask"]))))
 
     def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-        """Nothing to remember."""
+        """Do nothing: the agent has no memory."""

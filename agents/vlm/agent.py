@@ -98,7 +98,7 @@ class VLMAgent:
         self._over_limit = ""  # the words of the first refusal
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
-        """Tell the model the result of its last action, and return what it decides.
+        """Send the model the result of its last action, and return its decision.
 
         Raises:
             ModelError: the model gives no reply in this episode.
@@ -121,7 +121,7 @@ class VLMAgent:
                 self._over_limit = self._over_limit or str(refusal)
 
     def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-        """Somebody else decides this step. The conversation goes on as if the model had said so."""
+        """A person decides this step. The conversation goes on as if the model had decided it."""
         self._messages.append(self._turn(obs, info))
         self._read(_in_form(action, self._settings.decide), info, by=PERSON)
 

@@ -1,5 +1,4 @@
-"""Prompts that are the texts of a dialect: what training files say, a model that was tuned on them
-is told when it plays.
+"""Prompts from a dialect: a tuned model gets the same texts at play as in its training files.
 
 The texts are made by the functions that make the training files (:mod:`er_gym.data.dialects`).
 """

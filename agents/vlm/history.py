@@ -1,8 +1,8 @@
-"""What of a conversation is sent again: all of it, or less where it is over a limit.
+"""Which earlier turns of a conversation are sent: all, or fewer if it is over a limit.
 
-Left out are first the oldest pictures, then the words of the oldest turns. The task, the last
-message and what the model did stay. Places and roles of the messages stay too, so that every chat
-template takes what is left.
+First the oldest pictures are left out, then the texts of the oldest turns. The task, the last
+message and the model's actions stay. The order and roles of the messages stay, too, so that every
+chat template accepts the rest.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Limits:
 
     Attributes:
         pictures: the most pictures; None for no limit. Those of the last message are always sent.
-        shortened: how many messages after the task, the oldest first, are sent without their words.
+        shortened: how many messages after the task, the oldest first, are sent without their texts.
     """
 
     pictures: int | None = None

@@ -2,9 +2,9 @@
 
 The file is a list of conversations, in JSON or JSON Lines: ``messages`` with ``role`` and
 ``content``, or ``conversations`` with ``from`` and ``value``. The user asks for a task, the
-assistant decides between ``<DecisionMaking>`` tags, the user shows what came of it, and so on. The
-text that all conversations share is the prompt. Task, action and feedback are the parts that
-differ. The file's texts are not templates: braces in them are plain braces.
+assistant decides between ``<DecisionMaking>`` tags, the user shows the result, and so on. The text
+that all conversations share is the prompt. Task, action and feedback are the parts that differ. The
+file's texts are not templates: braces in them are plain braces.
 """
 
 from __future__ import annotations
@@ -152,7 +152,8 @@ def read_prompts(path: Path, fallback: PromptSet) -> DerivedPrompts:
         fallback: the prompts for turns that such files lack.
 
     Raises:
-        ValueError: the file cannot be read, or the task cannot be told from the text around it.
+        ValueError: the file cannot be read, or the task cannot be separated from the text around
+            it.
     """
     found: list[_Sample | None] = []
     try:

@@ -72,8 +72,8 @@ class PromptSet(Protocol):
         after_observe: the number of pictures that the model expects after ``observe``: 1 for the
             view ahead; 3 for right, behind and left; 4 for these and the view ahead. None for all
             that there are.
-        as_recorded: whether turns are told as trajectories record them: an unchanged view is not
-            shown again.
+        as_recorded: whether the messages are those of recorded trajectories: an unchanged view is
+            not shown again.
     """
 
     @property

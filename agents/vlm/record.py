@@ -76,7 +76,7 @@ class RoundRecord(_Record, GrownRecord):
         name: the model's name for the object; ``matched``: how it was matched with a type:
             ``exact``, ``alias``, ``fuzzy``, ``meaning``.
         rules: the tolerance rules that were needed to read the reply.
-        problem: what was wrong with the reply, as the model was told.
+        problem: what was wrong with the reply, as the feedback to the model states it.
         feedback, success: the environment's answer.
         seconds, prompt_tokens, completion_tokens, cached_tokens, reasoning_tokens, cost, finish,
         model: see :class:`agents.vlm.chat.Reply`; cost in US dollars.

@@ -135,7 +135,7 @@ class Reasoning(StrictSettings):
 
 
 class History(StrictSettings):
-    """What of the conversation is sent again with each turn.
+    """Which earlier turns of the conversation are sent with each turn.
 
     Attributes:
         trim: whether the oldest pictures, and after them the oldest words, are left out where the

@@ -1,4 +1,4 @@
-"""What is amiss with a reply, by the names of :data:`er_gym.rollout.causes.CAUSES`."""
+"""Finds the causes of an unusable reply, by their names in :data:`er_gym.rollout.causes.CAUSES`."""
 
 from __future__ import annotations
 

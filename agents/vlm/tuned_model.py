@@ -1,4 +1,4 @@
-"""The directory of a fine-tuned model: where its files are, and how it was taught to converse."""
+"""The directory of a fine-tuned model: where its files are, and the prompts it was tuned on."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class Figure(_Card):
 
 
 class Card(_Card):
-    """What is said of a model.
+    """The facts about a model.
 
     Attributes:
         format: the version of this layout.

@@ -98,7 +98,7 @@ class BenchOptions(OptionGroup):
     track: tuple[str, ...] = option(
         multiple=True,
         type=click.Choice(TRACKERS),
-        help="Log the run's figures for this program too; may be repeated.",
+        help="Also log the run's figures in the format of this program; may be repeated.",
     )
     seed: int = shared(seed_option)
     backend: str | None = option(help="The engine: embedded or unity.  [default: the suite's]")
@@ -233,7 +233,7 @@ def _left_in(out: Path, chosen: Sequence[Task], samples: int, *, says_how: bool 
 
 
 def _print_causes(out: Path) -> None:
-    """Say what was amiss with the agent's replies in a run that ended early."""
+    """Print the causes of unusable replies in a run that ended early."""
     from benchmarks.scoring.report import load_run
     from er_gym.rollout.run_directory import MANIFEST
 

@@ -57,12 +57,12 @@ def collect(
 ) -> int:
     """Collect trajectories with pictures and thoughts, to train on.
 
-    An expert that knows where things are, and explorers that do not, play the tasks of a suite. The
-    default recipe has the parts and proportions of the paper's training set. The same command
-    continues a collection; a larger --limit extends it. `er-gym data` shows, verifies and exports
-    collections. With --expert, a model writes the thoughts; what it replied and cost stays in the
-    directory. With --select, successful episodes of any agent become trajectories; with --correct,
-    failed ones are corrected.
+    Scripted agents play the tasks of a suite: an expert that knows where objects are, and explorers
+    that do not. The default recipe has the parts and proportions of the paper's training set. The
+    same command continues a collection; a larger --limit extends it. `er-gym data` shows, verifies
+    and exports collections. With --expert, a model writes the thoughts; its replies and their cost
+    are kept in the directory. With --select, successful episodes of any agent become trajectories;
+    with --correct, failed ones are corrected.
     """
     from agents.expert.collect import Collector
     from benchmarks.cli.collect_choice import chosen_recipe, source_of

@@ -36,22 +36,23 @@ class ExpertOptions(OptionGroup):
     )
     places: str | None = option(
         type=click.Choice(["likely", "model"]),
-        help="Who names the wrong places of a search: the likelihoods or the model.  "
-        "[default: likely]",
+        help="How the wrong places of a search are chosen: drawn by likelihood, or named by the "
+        "model.  [default: likely]",
     )
     decisions: str | None = option(
         type=click.Choice(["plan", "model"]),
-        help="Who decides the actions: the expert's plan, or the model, of which what succeeds is "
-        "kept.  [default: plan]",
+        help="Who decides the actions: the expert's plan; or the model, whose successful episodes "
+        "are kept.  [default: plan]",
     )
     hint: str | None = option(
         type=click.Choice(["none", "plan"]),
-        help="What a model that decides is told beside the task.  [default: none]",
+        help="With --decisions model: the hint that the model gets beside the task.  "
+        "[default: none]",
     )
     strict_thoughts: bool = option(
         is_flag=True,
-        help="Of a model that decides, and with --select, take only what the critic finds no fault "
-        "in.",
+        help="With --decisions model or --select: take only episodes all of whose thoughts the "
+        "critic accepts.",
     )
 
     @property

@@ -65,8 +65,8 @@ class CollectOptions(OptionGroup):
         default="transitions",
         show_default=True,
         metavar="NAME",
-        help="Which kinds of thoughts follow which: a YAML file, or the name of one of er-gym's "
-        "own.",
+        help="The transitions between kinds of thoughts: a YAML file, or the name of one of "
+        "er-gym's own.",
     )
     language: Language = option(
         type=click.Choice(LANGUAGES),
@@ -76,7 +76,7 @@ class CollectOptions(OptionGroup):
     )
     no_pictures: bool = option(
         is_flag=True,
-        help="Record what is seen in words alone, for models that read: many times as fast.",
+        help="Record the view as text only, for models without vision: many times as fast.",
     )
     width: int | None = shared(size_option("--width"))
     height: int | None = shared(size_option("--height"))
@@ -87,17 +87,19 @@ class CollectOptions(OptionGroup):
     )
     correct_after: CorrectAfter | None = option(
         type=click.Choice(("wrong", "failure", "anywhere")),
-        help="With --correct: the expert takes over after the first action that did no key action; "
-        "after the first that failed since the last key action, or anywhere: after up to six "
-        "actions drawn at random, first among the refused ones.  [default: wrong, as in the paper]",
+        help="With --correct: where the expert takes over. wrong: after the first action that did "
+        "no key action; failure: after the first that failed since the last key action; anywhere: "
+        "after up to six actions drawn at random, refused ones first.  "
+        "[default: wrong, as in the paper]",
     )
     correct_by: CorrectBy | None = option(
         type=click.Choice(("expert", "searcher")),
-        help="With --correct: who takes over. The searcher knows no more than the failed agent "
-        "did.  [default: expert]",
+        help="With --correct: which agent takes over. The searcher knows only what the failed "
+        "agent knew.  [default: expert]",
     )
     allow_empty: bool = option(
-        is_flag=True, help="With --select and --correct: end well also if no episode can be taken."
+        is_flag=True,
+        help="With --select or --correct: exit with 0 even if no episode can be taken.",
     )
 
 

@@ -67,25 +67,26 @@ class SelectOptions(OptionGroup):
     )
     most_actions: int | None = option(
         type=click.IntRange(min=1),
-        help=f"Take no longer episodes.  [default: {_DEFAULT_MOST_ACTIONS}]",
+        help=f"Take only episodes of at most so many actions.  [default: {_DEFAULT_MOST_ACTIONS}]",
     )
     most_tokens: int | None = option(
-        type=click.IntRange(min=1), help="Take no longer conversations, in the model's own tokens."
+        type=click.IntRange(min=1),
+        help="Take only conversations of at most so many tokens, as the model counts them.",
     )
     per_task: int | None = option(
         type=click.IntRange(min=1), help="Take at most so many episodes of a task."
     )
     balance: float | Literal["recipe", "none"] | None = option(
         type=Balance(),
-        help="Take at most so many times as many of a task type as of the rarest; or recipe: in "
-        f"the proportions of --recipe; or none.  [default: {_DEFAULT_BALANCE}]",
+        help="Take at most so many times as many episodes of a task type as of the rarest one; "
+        f"or recipe: in the proportions of --recipe; or none.  [default: {_DEFAULT_BALANCE}]",
     )
     keep_failed: bool = option(
         is_flag=True,
-        help="Also take episodes in which actions failed; failed turns are not learnt from.",
+        help="Also take episodes in which actions failed; failed turns are not trained on.",
     )
     rewrite_thoughts: bool = option(
-        is_flag=True, help="Have --writer write the thoughts, also where the model left its own."
+        is_flag=True, help="Let --writer write the thoughts, even if the model wrote its own."
     )
 
 
@@ -97,7 +98,7 @@ class Selection:
         runs: the runs, of the same tasks in the same environment.
         options: of the command line.
         recipe: for the balance.
-        strict: whether the critic must find no fault in any thought.
+        strict: whether the critic must accept every thought.
     """
 
     runs: tuple[RunDirectory, ...]

@@ -93,12 +93,12 @@ def verify(
     suite: str | None,
     executor_options: ExecutorOptions,
 ) -> int:
-    """Replay every trajectory, and say where anything comes out differently.
+    """Replay every trajectory, and report every difference from the record.
 
-    Compared are what the agent saw, the results and rewards of its actions, faults, feedback, and
-    pictures. Checked are the thoughts, by the critic, and the course: kind b is the key actions
-    and nothing else, what must succeed does, and every fault is recovered. Exit code 1 if there is
-    a difference.
+    The command compares the objects in view, the results and rewards of actions, faults, feedback
+    and pictures. The critic checks the thoughts. Three rules are checked, too: trajectories of kind
+    b consist of the key actions, trajectories that must succeed do, and the agent recovers from
+    every fault. The exit code is 1 if there is a problem.
     """
     from contextlib import ExitStack, closing
     from itertools import islice

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 @click.option(
     "--language",
     type=click.Choice(LANGUAGES),
-    help="Of the prompts.  [default: the language of each trajectory's thoughts]",
+    help="The language of the prompts.  [default: that of each trajectory's thoughts]",
 )
 @click.option(
     "--held-out",
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 @click.option(
     "--per-turn",
     is_flag=True,
-    help="With sharegpt: one sample for each turn that is to be learnt, of every trajectory.",
+    help="With sharegpt: one sample for each trained turn of every trajectory.",
 )
 @click.option(
     "--copy", is_flag=True, help="Copy pictures; else they are hard links where possible."

@@ -1,4 +1,4 @@
-"""``er-gym data frames``: pictures of rooms with what is truly in view."""
+"""``er-gym data frames``: pictures of rooms with the objects in view."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _QUALITY = 80
     "number",
     required=True,
     type=click.IntRange(min=1),
-    help="How many; the same command with more goes on.",
+    help="How many; the same command with a larger number adds frames.",
 )
 @click.option("--scenes", metavar="SCENE,…", help="Only these rooms of the suite.")
 @size_option("--width")
@@ -45,11 +45,11 @@ def frames(
     workers: int,
     seed: int,
 ) -> int:
-    """Draw pictures of a suite's rooms, with what is truly in view, to teach a model to see.
+    """Render pictures of a suite's rooms, with the objects in view, to train a model's vision.
 
-    They are taken from poses that agents take, in the suite's arrangements, with some things opened
-    or switched on. er-gym finetune learns from them. It refuses rooms that are kept for evaluation:
-    frames of these are for measuring, by python -m benchmarks.eyes.
+    The poses are those of agents, in the suite's arrangements, with some objects opened or switched
+    on. er-gym finetune trains on frames. It refuses frames of evaluation rooms: those are for
+    measuring a model with python -m benchmarks.eyes.
     """
     from er_gym.data.frame_camera import DrawingError, draw_frames, visits
     from er_gym.data.frames import FRAMES, FrameSet

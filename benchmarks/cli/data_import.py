@@ -36,9 +36,9 @@ def import_(
 ) -> None:
     """Turn a ShareGPT file with pictures, such as the paper's, into trajectories.
 
-    Thoughts are told apart by their tags, or by the phrases with which they begin; actions are read
-    from <DecisionMaking>. What the file does not tell, such as poses and key actions, stays empty:
-    er-gym data stats, show and export work on the result, verify does not.
+    Thoughts are split at their tags, or at the phrases with which they begin; actions are read from
+    <DecisionMaking>. Fields that the file lacks, such as poses and key actions, stay empty: er-gym
+    data stats, show and export work on the result, verify does not.
     """
     from benchmarks.cli.progress import counting
     from er_gym.data.sharegpt_files import open_sharegpt

@@ -73,13 +73,14 @@ class ExecutorOptions(OptionGroup):
         help="Every node of the cluster sees this machine's files under the same paths.",
     )
     worker_cpus: float | None = option(
-        type=Finite(min=0), help="The processors that a worker asks the cluster for.  [default: 1]"
+        type=Finite(min=0),
+        help="The processors that a worker requests from the cluster.  [default: 1]",
     )
     worker_memory: float | None = option(
         type=Finite(min=0.0625),
         metavar="GIB",
-        help="The memory that a worker asks the cluster for; one that takes more is replaced.  "
-        "[default: 1]",
+        help="The memory that a worker requests from the cluster; a worker that uses more is "
+        "replaced.  [default: 1]",
     )
 
     def __post_init__(self) -> None:

@@ -54,7 +54,7 @@ class FinetuneOptions(OptionGroup):
         multiple=True,
         type=PATH,
         metavar="PATH",
-        help="What is learnt: a collection of er-gym collect, or a ShareGPT file; may be repeated.",
+        help="The training data: a collection, frames, or a ShareGPT file; may be repeated.",
     )
     out: Path = option(
         required=True,
@@ -62,16 +62,16 @@ class FinetuneOptions(OptionGroup):
         help="The run directory; the same command again continues it.",
     )
     ignore_memory: bool = option(
-        is_flag=True, help="Train although by the estimate it does not fit into the memory."
+        is_flag=True, help="Train even if the estimate says that the memory is too small."
     )
     program: str | None = option(
         "--print",
         type=click.Choice(PRINTABLE),
-        help="Train nothing; write the complete files with which this program makes the run.",
+        help="Train nothing; write all files that this program needs for the run.",
     )
     gpus: int | None = option(
         type=click.IntRange(min=1),
-        help="With --print: how many GPUs.  [default: 8, LoRA 1]",
+        help="With --print: the number of GPUs.  [default: 8, LoRA 1]",
     )
     copy: bool = option(is_flag=True, help="With --print: copy pictures instead of linking them.")
 

@@ -55,7 +55,7 @@ def inspect(
 ) -> int:
     """Play a suite with a model of Inspect; needs the extra inspect.
 
-    `inspect view` then shows every conversation with its pictures. For all that Inspect can do:
+    `inspect view` then shows every conversation with its pictures. To use all options of Inspect:
     `inspect eval benchmarks/inspect_task.py@er_gym`.
     """
     from er_gym.activity import begin_import

@@ -204,8 +204,8 @@ def suites() -> None:
 def envs() -> None:
     """List the registered environments, one for each task type.
 
-    Wherever a type is asked for, each of its names will do: its id, the title and the name that
-    stand behind it here, or the group for all of its types. Upper and lower case, hyphens,
+    Options that take a task type accept each of its names: its id, the title and the names that
+    this command prints after it, or the group for all of its types. Upper and lower case, hyphens,
     underscores and spaces make no difference.
     """
     from er_gym.tasks.types import BY_NAME, GROUPS, short_name

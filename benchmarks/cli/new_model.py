@@ -23,7 +23,7 @@ from benchmarks.terminal import echo
     help="A collection, or frames, from which the tokenizer learns; may be repeated.",
 )
 @click.option(
-    "--dialect", default="paper", show_default=True, help="How its trajectories are put into words."
+    "--dialect", default="paper", show_default=True, help="The dialect of the conversations."
 )
 @overrides_option("vocabulary=2048")
 @click.option(
@@ -31,7 +31,7 @@ from benchmarks.terminal import echo
     type=click.IntRange(0, MOST_SEED),
     default=0,
     show_default=True,
-    help="Of the weights.",
+    help="The seed of the random weights.",
 )
 @click.option("--out", required=True, type=FOLDER, help="The directory of the model.")
 def new_model(
@@ -42,10 +42,10 @@ def new_model(
     seed: int,
     out: Path,
 ) -> None:
-    """Make a small model with random weights, to be taught from nothing.
+    """Make a small model with random weights, to train it from scratch.
 
-    ARCHITECTURE is a YAML file, or the name of one of er-gym's own. The tokenizer is learnt from
-    the conversations of collections and frames.
+    ARCHITECTURE is a YAML file, or the name of one of er-gym's own. The tokenizer is trained on the
+    conversations of collections and frames.
     """
     from agents.finetune.architecture import load_architecture
     from er_gym.activity import begin_import

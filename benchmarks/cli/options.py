@@ -155,7 +155,7 @@ workers_option = click.option(
 def size_option(name: str) -> Any:
     """``--width`` or ``--height``, of pictures; None for the suite's own."""
     return click.option(
-        name, type=click.IntRange(16, 4096), help="Of pictures, pixels.  [default: the suite's]"
+        name, type=click.IntRange(16, 4096), help="Picture size in pixels.  [default: the suite's]"
     )
 
 

@@ -1,4 +1,4 @@
-"""``er-gym prompts``: the texts that models are told, and copies of them to be changed."""
+"""``er-gym prompts``: the texts of prompts, and copies of them to be changed."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _DIALECT = _Kind(
 @click.group(invoke_without_command=True)
 @click.pass_context
 def prompts(context: click.Context) -> None:
-    """List the sets of prompts that models are told, or copy one to change it."""
+    """List the sets of prompts for models, or copy one to change it."""
     if context.invoked_subcommand is not None:
         return
     sets = _sets()

@@ -160,11 +160,11 @@ def _show(study: Study) -> None:
 ladder = _study(
     "ladder",
     "ladder",
-    """Climb the paper's ladder: collect, imitate, explore, reflect.
+    """Train a model in the paper's three stages: imitation, exploration, reflection.
 
-    A model learns in three stages and is measured after each, in rooms that it has not seen. Each
-    phase is a command of er-gym, which --print shows. The same command continues a ladder. It ends
-    with a table and a picture, beside the paper's.
+    The model is evaluated after each stage, in rooms that it has not seen. Each phase is a command
+    of er-gym, which --print shows. The same command continues a ladder. At the end it writes a
+    table and a picture, with the paper's figures beside.
     """,
 )
 ablate = _study(
@@ -173,6 +173,6 @@ ablate = _study(
     """Train many small models, each without some part, and compare them.
 
     Each phase is a command of er-gym, which --print shows. The same command continues an ablation.
-    It ends with a table for each study, of all rows that have been measured.
+    At the end it writes a table for each study, with all rows that have been measured.
     """,
 )

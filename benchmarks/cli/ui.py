@@ -74,12 +74,12 @@ def ui(
     vlm_options: VLMOptions,
     files: FileOptions,
 ) -> int:
-    """Show runs in the browser, while they grow or after.
+    """Show runs in the browser, during the run or afterwards.
 
     FOLDERs hold run directories, at any depth; without one, ./runs. Nothing in them is changed. The
     options from --agent-config on are for vision-language agents that a person watches with --play.
 
-    With --export or --video nothing is shown: a run's pages, or an episode's video, are written.
+    With --export or --video it starts no server, and writes a run's pages or an episode's video.
     """
     with needing("er-gym ui", "er-gym[ui]"):
         import uvicorn

@@ -22,8 +22,8 @@ class FileOptions(OptionGroup):
     export: Path | None = option(
         type=EXISTING_FOLDER,
         metavar="RUN",
-        help="Show nothing; write a run's pages to --out: one file with everything in it where the "
-        "name ends in .html, else a folder.",
+        help="Start no server; write a run's pages to --out: one self-contained file if the name "
+        "ends in .html, else a folder.",
     )
     episodes: int | None = option(
         type=click.IntRange(0),
@@ -38,21 +38,23 @@ class FileOptions(OptionGroup):
     )
     draw: bool = option(
         is_flag=True,
-        help="With --export: draw what the agent could see where it was shown no pictures.",
+        help="With --export: render the agent's view if it was shown no pictures.",
     )
     video: Path | None = option(
         type=EXISTING_FOLDER,
         metavar="RUN",
-        help="Show nothing; write an episode of a run to --out as a video: .webp, or .mp4 with "
+        help="Start no server; write an episode of a run to --out as a video: .webp, or .mp4 with "
         "imageio-ffmpeg.",
     )
-    episode: str | None = option(metavar="KEY", help="With --video: which.  [default: the first]")
+    episode: str | None = option(
+        metavar="KEY", help="With --video: the episode.  [default: the first]"
+    )
     out: Path | None = option(type=PATH, help="What --export or --video writes.")
     language: str = option(
         type=click.Choice(LANGUAGES),
         default="en",
         show_default=True,
-        help="With --export: of the words.",
+        help="With --export: the language of the pages.",
     )
     overwrite: bool = option(is_flag=True, help="Replace what is at --out.")
 

@@ -115,8 +115,8 @@ def add(
     """Put the model of a training run into the zoo, or bring it up to date; for maintainers.
 
     RUN is a run directory of er-gym train-rl or er-gym finetune. The figures are read from the run
-    directories, never typed. First add the model without them, play it as zoo:NAME, then add it
-    again with them.
+    directories, never entered by hand. First add the model without them, play it as zoo:NAME, then
+    add it again with them.
     """
     if not _NAME.fullmatch(name) or name in zoo.commands:
         raise BadInput(

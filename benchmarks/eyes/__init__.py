@@ -3,9 +3,9 @@
     er-gym data frames --suite er-1k --frames 300 --width 448 --height 252 --out runs/unseen
     python -m benchmarks.eyes runs/ladder/er-tiny-vl/base runs/unseen
 
-The model is shown pictures of rooms that it did not learn from, by the client that plays, and is
-asked for all that is in view, and for single types. The blind copy is the same model, shown noise.
-Noise may confuse a model more than it blinds it, so its answers are also held against the truth of
-other frames: what is right then, it could have guessed without looking.
-The dialect must have words for frames, such as ``sight``.
+The client of the agents shows the model pictures of rooms that it was not trained on, and asks for
+all types in view, and about single types. The blind copy is the same model, shown noise. Noise may
+confuse a model more than missing vision would, so its answers are also scored against the labels of
+other frames: this score is what guessing reaches. The dialect must have words for frames, such as
+``sight``.
 """

@@ -1,4 +1,4 @@
-"""What a small vision-language model answers about frames, and the figures of that."""
+"""A small vision-language model's answers about frames, and the figures computed from them."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def precision_recall_f1(answers: Iterable[Answers]) -> tuple[float, float, float
 
 
 def misplaced(answers: Sequence[Answers]) -> list[Answers]:
-    """The answers with what is in view in another frame: that half of the list away."""
+    """The answers with the labels of another frame: the one half of the list away."""
     half = len(answers) // 2
     others = [*answers[half:], *answers[:half]]
     return [replace(each, there=other.there) for each, other in zip(answers, others, strict=True)]
@@ -157,7 +157,7 @@ def f1_interval(answers: Sequence[Answers]) -> tuple[float, float]:
 
 
 def figures(found: Mapping[str, Sequence[Answers]]) -> Table:
-    """A column for each way of seeing."""
+    """A table with a column for the model and for its blind copy."""
     rows: list[tuple[str, ...]] = []
     scores = {name: precision_recall_f1(answers) for name, answers in found.items()}
     for place, name in enumerate(("precision", "recall", "F1")):

@@ -55,8 +55,7 @@ def make_app(
     Args:
         roots: the directories that it may read.
         token: must be given once as ``?token=``; "" where only this machine can connect. Then
-            requests must name this machine as their host, so that no foreign page can read along
-            through a name that it made point here.
+            requests must name this machine as their host, as a protection against DNS rebinding.
         closing: set when the server is to end, so that pages that wait for news let go.
         play: the directory for the runs that a person plays; None if nobody may play.
         vlm_run: the run of a vision-language agent that a person watches, by its name; None for

@@ -39,7 +39,7 @@ _MOST_KEPT = 16
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What a list says of a trajectory.
+    """The fields of a trajectory that lists show.
 
     Attributes:
         offset: of its line's first byte.

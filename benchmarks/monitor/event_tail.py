@@ -24,7 +24,7 @@ lines are steps; to parse their thoughts, which are not shown here, would take m
 
 @dataclass(slots=True)
 class EpisodeRow:
-    """What the stream tells of one episode.
+    """What the event stream contains about one episode.
 
     Attributes:
         key: the name of the episode in its run.
@@ -36,7 +36,7 @@ class EpisodeRow:
         steps, reward, seconds: so far.
         tokens, cost: of the model's replies that were not cached, cost in US dollars.
         last: the last action.
-        causes: what was amiss with its replies; None while it plays.
+        causes: of its unusable replies; None while it plays.
         before: while it is played again, the result that it had: it had crashed.
     """
 
@@ -76,7 +76,7 @@ class EpisodeRow:
 
 @dataclass
 class EventTail(LineFollower):
-    """The state of a run as its event stream tells it.
+    """The state of a run, read from its event stream.
 
     Attributes:
         rows: by episode, in the order in which they began first.

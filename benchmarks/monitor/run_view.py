@@ -140,7 +140,7 @@ class RunSummary:
         spent: so far, by the run's ledger; by its replies if it has none.
         decisions_per_second: in the last minute of play.
         seconds_left: by the speed of this start; None if unknown.
-        causes: what was amiss with the agent's replies, a line for each cause.
+        causes: the causes of unusable replies, a line for each.
         version: changes when anything does.
     """
 

@@ -117,8 +117,8 @@ def _ladder_section(ladder: Study, record: PlanRecord, images: Path, force: bool
     ]
     if chosen:
         lines += [
-            "One failure of each kind, of the last stage, of median length. Circles mark what the "
-            "task is about; numbers are steps.",
+            "One failure of each kind, of the last stage, of median length. Circles mark the "
+            "objects of the task; numbers are steps.",
             "",
             f"![Failures on maps](images/{name}-failures.png)",
             "",
@@ -204,7 +204,7 @@ def _generalisation(ladders: Iterable[Study], others: Iterable[tuple[str, Path]]
     ]
     if not reports:
         return []
-    return [f"## How far it carries\n\n{as_markdown([split_table(split_results(reports))])}"]
+    return [f"## Generalization\n\n{as_markdown([split_table(split_results(reports))])}"]
 
 
 def _ablation_section(ablation: Study, record: PlanRecord, images: Path, force: bool) -> str:
@@ -225,14 +225,14 @@ def _ablation_section(ablation: Study, record: PlanRecord, images: Path, force: 
 
 _INTRODUCTION = """# Models
 
-This page shows what small language models learn with er-gym, from nothing or little, and where they
-fail. `python -m benchmarks.pages.models` makes it from the directories of `er-gym ladder` and
-`er-gym ablate` ([ladder.md](ladder.md)). All episodes use `instances="explore"`, where the
-environment does not look at the task to choose which object a type name means, and the corrected
-scorer. Intervals are at 95 %. Each model is the one at the end of its training. What the third
-stages learn from was chosen after earlier tries had been measured with the same tasks
-([ladder.md](ladder.md) has them all). The policies of reinforcement learning are in
-[baselines.md](baselines.md). [zoo.md](zoo.md) lists the models that come with er-gym.
+This page shows how well small language models play after training with er-gym, most of them from
+random weights, and why their episodes fail. `python -m benchmarks.pages.models` makes it from the
+directories of `er-gym ladder` and `er-gym ablate` ([ladder.md](ladder.md)). All episodes use
+`instances="explore"`, where the environment does not look at the task to choose which object a type
+name means, and the corrected scorer. Intervals are at 95 %. Each model is the one at the end of its
+training. We chose the training data of the third stages after we had evaluated earlier choices on
+the same tasks ([ladder.md](ladder.md) lists all of them). The policies of reinforcement learning
+are in [baselines.md](baselines.md). [zoo.md](zoo.md) lists the models that come with er-gym.
 
 Times are those of {machine}, with no GPU. Other programs used the machine meanwhile.
 

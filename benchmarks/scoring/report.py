@@ -110,7 +110,7 @@ class RunReport:
 
     @property
     def causes(self) -> list[CauseCount]:
-        """What was amiss with the agent's replies, as the records name it."""
+        """The causes of unusable replies, as the records name them."""
         return count_causes(map(causes_in, self.episodes))
 
     @property

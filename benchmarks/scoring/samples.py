@@ -56,7 +56,7 @@ def variance_between(tasks: Sequence[str], values: Sequence[float]) -> float | N
 
 
 def effective_number(tasks: Sequence[str], successes: Sequence[bool]) -> float:
-    """How many episodes of different tasks would tell as much of a rate of success.
+    """The effective sample size: how many episodes of different tasks give as narrow an interval.
 
     It lies between the number of tasks, if all episodes of a task come out alike, and the number
     of episodes, if they are as different as those of different tasks.

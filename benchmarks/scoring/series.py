@@ -1,5 +1,5 @@
-"""What a chart shows: series over two axes. It is told once and drawn by two: as a picture by
-:mod:`benchmarks.scoring.drawing`, and in a page by :mod:`benchmarks.monitor.charts`.
+"""What a chart shows: series over two axes. It is described once and drawn in two ways: as a
+picture by :mod:`benchmarks.scoring.drawing`, and in a page by :mod:`benchmarks.monitor.charts`.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Plans: many commands of er-gym's, run one after another, each once, whatever happens."""
+"""Plans: commands of er-gym that run one after another, each once, also after interruptions."""

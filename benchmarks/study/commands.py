@@ -51,7 +51,7 @@ class Commands:
         )
 
     def teach(self, names: tuple[str, str], run: str, out: str, taught: Taught) -> list[Phase]:
-        """Lets another agent play, and takes its successes.
+        """The phases in which another agent plays and its successes are collected.
 
         Args:
             names: of the two phases.

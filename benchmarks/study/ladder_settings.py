@@ -18,12 +18,12 @@ from benchmarks.study.settings import (
 )
 
 Control: TypeAlias = Literal["random", "blind"]
-"""Who plays beside the ladder: actions at random, or the last model with noise for pictures."""
+"""The agents to compare with: random actions, or the last model with noise for pictures."""
 CONTROLS: tuple[Control, ...] = ("random", "blind")
 
 
 class Eyes(StrictSettings):
-    """What the base model learns to see by, before the first stage.
+    """Pretraining of the base model's vision on frames, before the first stage.
 
     Attributes:
         frames: how many are drawn of the suite's rooms (:mod:`er_gym.data.frames`).
@@ -37,13 +37,13 @@ class Eyes(StrictSettings):
 
 
 class Base(StrictSettings):
-    """The model at the foot of the ladder; a model or an architecture.
+    """The model that the ladder starts from: a model or an architecture.
 
     Attributes:
         model: a directory with a model in it, or a run of ``er-gym finetune``.
         architecture: a new model of this architecture (:mod:`agents.finetune.architecture`); its
             tokenizer is learnt from the first stage's conversations, and from the frames.
-        eyes: how it is taught to see first; None for not at all.
+        eyes: pretraining of its vision; None for none.
     """
 
     model: str = ""
@@ -114,7 +114,7 @@ class StageSettings(StrictSettings):
 
 
 class LadderEvaluation(Evaluation):
-    """How each rung is measured.
+    """How the model of each stage is evaluated.
 
     Attributes:
         faults: fault rates of further evaluations, after the stages from the second on.

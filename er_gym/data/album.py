@@ -1,4 +1,4 @@
-"""Puts pictures into an output: the one way in which imports and exports link or copy them."""
+"""Puts pictures into an output folder: imports and exports link or copy them here."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ _LONGEST_ENDING = 6
 
 @dataclass(frozen=True)
 class Outside:
-    """Pictures that lie elsewhere than where they were looked for.
+    """Counts the pictures that lie outside the folder in which they are expected.
 
     Attributes:
         count: how many.
-        folder, first: where they were looked for, and where the first of them lies.
+        folder, first: the expected folder, and the path of the first of them.
     """
 
     count: int = 0
@@ -36,7 +36,7 @@ class Album:
     Attributes:
         folder: of the output.
         pictures, linked: how many there are, and how many of them are hard links.
-        outside: of those that were taken from elsewhere.
+        outside: the pictures from outside the expected folder.
     """
 
     def __init__(self, folder: Path, *, copy: bool) -> None:

@@ -1,8 +1,8 @@
-"""What covers each square of a picture: the truth about single places in it.
+"""What covers each square of a picture: labels for single places in it.
 
-A small model that learns to see from sentences alone takes long to find out which part of the
-picture a word is about. The engine knows what each pixel shows, so a frame can tell it for a grid
-of squares, and fine-tuning teaches it at the picture's own tokens.
+From sentences alone, a small model takes long to learn which part of the picture a word refers to.
+The engine knows the object at each pixel, so a frame stores the type that covers each square of a
+grid, and fine-tuning gives each picture token a loss for the type of its square.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _ROOM = [KIND_OF[name] for name in sorted(verbs.NOWHERE) if name in KIND_OF]
 
 
 class CoveredPicture(PictureRecord):
-    """A picture of which it is known what covers it.
+    """What covers the squares of a picture.
 
     Attributes:
         covers: what is in the picture, the room itself first.
@@ -42,8 +42,8 @@ class CoveredPicture(PictureRecord):
 def cells_of(perception: Perception) -> tuple[tuple[str, ...], str]:
     """What covers the squares of a view, as :class:`CoveredPicture` has it; ``""`` is the room.
 
-    Of several things that cover enough of a square, the one with the fewest pixels in the whole
-    picture stands for it: a Mug rather than the CounterTop on which it stands.
+    If several objects cover enough of a square, the one with the fewest pixels in the whole picture
+    labels it: a Mug rather than the CounterTop on which it stands.
 
     Args:
         perception: with instance masks.
@@ -70,9 +70,10 @@ def cells_of(perception: Perception) -> tuple[tuple[str, ...], str]:
 
 
 def on_grid(cells: str, rows: int, columns: int) -> list[int]:
-    """What stands for each square of another grid, row by row: an index into ``covers``.
+    """The label of each square of another grid, row by row: an index into ``covers``.
 
-    Of the squares that overlap with it, the thing that covers the fewest squares of the picture.
+    Among the labels of the overlapping squares, it is the one with the fewest squares in the
+    picture.
     """
     count = Counter(cells)
     count[SYMBOLS[0]] = len(cells) + 1  # the room comes last

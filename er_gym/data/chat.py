@@ -27,7 +27,7 @@ class ChatTurn:
     Attributes:
         role: who speaks.
         parts: texts and pictures in order. Only the user shows pictures.
-        train: whether an assistant's turn is learnt; False for all others.
+        train: whether an assistant's turn gets loss; False for all others.
     """
 
     role: Role
@@ -52,7 +52,7 @@ class Chat:
     Attributes:
         id: the trajectory's.
         turns: the messages.
-        reply_told: how a reply of the assistant is told by the user, with ``{reply}``; see
+        reply_told: how the user's message quotes a reply of the assistant, with ``{reply}``; see
             :func:`told_by_user`.
     """
 
@@ -77,7 +77,7 @@ class Chat:
 
 
 def trained_prefixes(chat: Chat) -> Iterator[Chat]:
-    """For each turn that is learnt, the conversation up to it, in which it alone is learnt."""
+    """For each turn with loss, the conversation up to it, in which it alone gets loss."""
     for place, turn in enumerate(chat.turns):
         if turn.train:
             before = (replace(each, train=False) for each in chat.turns[:place])
@@ -85,11 +85,11 @@ def trained_prefixes(chat: Chat) -> Iterator[Chat]:
 
 
 def told_by_user(chat: Chat) -> Chat:
-    """The conversation with the assistant's turns that are not learnt told by the user.
+    """The conversation in which the user's messages quote the assistant's turns without loss.
 
-    For formats in which every turn of the assistant is learnt: each such turn becomes part of the
-    user's message around it. User and assistant still take turns, no picture is lost, and what
-    comes after the last turn that is learnt is left out. Empty if no turn is learnt.
+    For formats in which every turn of the assistant gets loss: each turn that gets none becomes
+    part of the user's message around it. User and assistant still alternate, no picture is lost,
+    and everything after the last turn with loss is left out. Empty if no turn gets loss.
     """
     turns: list[ChatTurn] = []
     kept = 0

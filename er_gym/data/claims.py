@@ -1,7 +1,7 @@
-"""What a thought may not claim: one small function for each sort of claim.
+"""The critic's checks of claims about objects: one function for each kind of false claim.
 
-Each takes the clauses of a thought and what the agent knew, and tells the faults. A claim about a
-name that stands for several types is right if it is right for one of them.
+Each takes the clauses of a thought and what the agent knew, and yields the refusals. If a name
+stands for several types, a claim about it is right if it is right for one of them.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ PARTS: Mapping[str, frozenset[str]] = {
 
 
 def unseen(thought: Thought) -> Iterator[Refusal]:
-    """Claims to see what is not and was not in view, or says where it is."""
+    """Claims to see an object that is not and was not in view, or says where it is."""
     phrases = thought.phrases
     for clause in thought.clauses:
         strange = [each for each in clause.mentions if not each.types & thought.seen]
@@ -59,8 +59,7 @@ def unseen(thought: Thought) -> Iterator[Refusal]:
 
 
 def hidden(thought: Thought) -> Iterator[Refusal]:
-    """Says as a fact where something is that was never in view, or what a container holds that was
-    never opened."""
+    """States where an object is that was never in view, or what an unopened container holds."""
     phrases = thought.phrases
     for clause in thought.clauses:
         if clause.guessed or clause.negated:
@@ -88,7 +87,7 @@ def hidden(thought: Thought) -> Iterator[Refusal]:
 
 
 def inside(thought: Thought) -> Iterator[Refusal]:
-    """Tells what is in a container that is shut and that the agent has not opened."""
+    """States what is in a closed container that the agent has not opened."""
     for mention, holder in _told_to_be_on(thought):
         if not _is_shut(thought, holder) or not mention.types & thought.seen:
             continue
@@ -101,7 +100,7 @@ def inside(thought: Thought) -> Iterator[Refusal]:
 
 
 def support(thought: Thought) -> Iterator[Refusal]:
-    """Says that something in view lies in or on another thing than it does."""
+    """Says that an object in view lies in or on another object than it does."""
     for mention, holder in _told_to_be_on(thought):
         wrong = _not_on(thought, mention, holder)
         if wrong:
@@ -124,7 +123,7 @@ def _told_to_be_on(thought: Thought) -> Iterator[tuple[Mention, Mention]]:
 
 
 def side(thought: Thought) -> Iterator[Refusal]:
-    """Says that something in view is on a side where it is not."""
+    """Says that an object in view is on another side than it is."""
     for clause in thought.clauses:
         if not clause.mentions or clause.guessed or clause.negated or clause.past:
             continue
@@ -159,7 +158,7 @@ def _bears_there(thought: Thought, mention: Mention, clause: Clause, direction: 
 
 
 def denied(thought: Thought) -> Iterator[Refusal]:
-    """Claims not to see what is in view."""
+    """Claims not to see an object that is in view."""
     for clause, match in _denials(thought, thought.phrases.denied):
         for mention in clause.named(match, "xs"):
             if mention.types <= thought.known.in_view:
@@ -167,7 +166,7 @@ def denied(thought: Thought) -> Iterator[Refusal]:
 
 
 def count(thought: Thought) -> Iterator[Refusal]:
-    """Claims that there are more of something in view than there are."""
+    """Claims that more objects of a type are in view than there are."""
     for clause in thought.clauses:
         if not clause.is_fact or clause.past or clause.wanted:
             continue
@@ -202,7 +201,7 @@ def state(thought: Thought) -> Iterator[Refusal]:
 
 
 def hand(thought: Thought) -> Iterator[Refusal]:
-    """Says that it holds what it does not, or that its hand is empty when it is not."""
+    """Claims to hold an object that it does not hold, or an empty hand while it holds one."""
     phrases, held = thought.phrases, thought.known.held
     truth = f"the agent holds {held}" if held else "the hand is empty"
     for clause, match in _denials(thought, phrases.not_held):

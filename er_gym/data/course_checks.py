@@ -1,4 +1,4 @@
-"""What must hold of a trajectory's course of actions, whatever the environment says."""
+"""Checks of a trajectory's sequence of actions, independent of the environment."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MUST_SUCCEED = frozenset({"a", "b", "c", "anomaly", "explored", "corrected"})
 
 
 def course_problems(trajectory: Trajectory) -> Iterator[str]:
-    """What is wrong with a trajectory's course, in a line each.
+    """What is wrong with a trajectory's sequence of actions, one line for each problem.
 
     - A trajectory of a kind that must succeed does.
     - One of kind ``b`` consists of the task's key actions.

@@ -1,8 +1,8 @@
 """The critic: checks a thought against what the agent could know.
 
-It reads what a thought claims as a fact: guesses, questions, plans and wishes claim nothing. What
-it cannot read it lets pass, so an honest thought stands, and a lie in words that it does not know
-does as well.
+It checks what a thought states as a fact; guesses, questions, plans and wishes state nothing. It
+accepts sentences that it cannot parse. So it does not refuse a true thought for its wording, but it
+also accepts a false one in a wording that it does not know.
 """
 
 from __future__ import annotations
@@ -54,9 +54,9 @@ def check(text: str, kind: ThoughtKind, knowledge: Knowledge, *, limit: int) -> 
         limit: the most words (in Chinese, two characters count as a word).
 
     Returns:
-        Every reason to refuse it; empty if it may stand. A text with more than 30 characters for
-        each word of the limit is refused for its length alone and not read any further, since some
-        checks take a time that grows faster than the text.
+        Every reason to refuse it; empty if the thought is accepted. A text with more than 30
+        characters for each word of the limit is refused for its length alone and not read any
+        further, since some checks take a time that grows faster than the text.
     """
     if len(text) > LONGEST_WORD * limit:
         return (Refusal("length", f"The thought is far too long; write at most {limit} words."),)

@@ -1,4 +1,4 @@
-"""What a thought may not say about actions: those done, and the one decided on."""
+"""The critic's checks of claims about actions: those done, and the one decided on."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _RECENT = 3
 
 
 def history(thought: Thought) -> Iterator[Refusal]:
-    """Claims to have done what was not done."""
+    """Claims to have done an action that was not done."""
     for clause in thought.clauses:
         if clause.asks or clause.conditional or clause.hedged or not clause.mentions:
             continue
@@ -123,7 +123,7 @@ class Decided:
 
 
 def decision(thought: Thought) -> Iterator[Refusal]:
-    """Decides on another action than the one that is taken."""
+    """Announces another action than the one that the turn takes."""
     known, phrases = thought.known, thought.phrases
     decided = [each for each in _decided(thought) if each.act != "look around" or each.clause.last]
     fitting = [each for each in decided if _fits(thought, each)]

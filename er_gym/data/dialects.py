@@ -59,7 +59,7 @@ class DialectTexts(BaseModel):
 
     ``{picture}`` is the place of a picture, ``{task}`` the instruction, ``{actions}`` the actions,
     ``{action}`` the last action and ``{feedback}`` the environment's answer to it. ``{scene}`` is
-    what the agent perceives, in words, in a dialect in which the user tells that in place of
+    what the agent perceives, in words, in a dialect whose user messages have text in place of
     pictures.
 
     Attributes:
@@ -254,10 +254,10 @@ def _read_texts(file: Path) -> DialectTexts:
 
 @dataclass(frozen=True)
 class LastDeed:
-    """The last action and what came of it.
+    """The last action and its result.
 
     Attributes:
-        action: such as ``navigate to Fridge``; what was said in its place, if that names no action.
+        action: such as ``navigate to Fridge``; or the text of a reply that names no action.
         success, feedback: the environment's answer.
     """
 

@@ -1,4 +1,4 @@
-"""The form of a thought: its length, language and marks, whatever it says."""
+"""The critic's checks of a thought's form: its length, language and marks."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def length(thought: Thought) -> Iterator[Refusal]:
 
 
 def language(thought: Thought) -> Iterator[Refusal]:
-    """Another language than it is to be written in, or two mixed."""
+    """It is not in the language that was asked for, or mixes two languages."""
     text = thought.text
     other = _OTHER_SCRIPTS.search(text)
     if thought.known.language == "zh":
@@ -85,7 +85,7 @@ def tags(thought: Thought) -> Iterator[Refusal]:
 
 
 def leak(thought: Thought) -> Iterator[Refusal]:
-    """Speaks of the prompt, of the data or of itself as a model, or is an error's text."""
+    """Mentions the prompt, the data or itself as a model, or contains an error's text."""
     found = thought.phrases.leak.search(thought.text.lower().replace("’", "'"))
     if found:
         yield Refusal(

@@ -1,8 +1,8 @@
-"""Draws frames: visits a room, changes it a little, and looks at it from many poses.
+"""Renders frames: it loads a room, opens or switches some objects, and takes many poses.
 
-What is drawn is a function of the seed and the visit's number alone. The poses are those that an
-agent takes in an episode: the start pose, a pose in front of a thing as ``navigate to`` chooses it,
-and any other place where one can stand, turned and tilted as agents are.
+The frames depend only on the seed and the visit's number. The poses are those that an agent takes
+in an episode: the start pose, the poses to which ``navigate to`` leads, and other reachable
+positions, with the rotations and tilts of agents.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Visit:
     """A visit to a room.
 
     Attributes:
-        number: by which everything in it is drawn.
+        number: with the seed, it determines all random choices of the visit.
         room: the room.
     """
 
@@ -97,7 +97,7 @@ def rooms_of(tasks: Iterable[Task]) -> list[Room]:
 
 
 def visits(rooms: Sequence[Room], number: int, seed: int) -> list[Visit]:
-    """The visits that give so many frames: all rooms in an order that is drawn, again and again."""
+    """The visits that give so many frames: all rooms in a random order, repeatedly."""
     order = np.random.default_rng([seed]).permutation(len(rooms)).tolist()
     return [Visit(k, rooms[order[k % len(rooms)]]) for k in range(-(-number // VISIT))]
 
@@ -105,7 +105,7 @@ def visits(rooms: Sequence[Room], number: int, seed: int) -> list[Visit]:
 def draw_frames(
     frames: FrameSet, camera: Camera, todo: Sequence[Visit], *, workers: int
 ) -> Iterator[int]:
-    """Draw the visits that are missing; yields the number of frames of each when it is there.
+    """Render the missing visits; yields the number of frames of each visit once it is written.
 
     Raises:
         DrawingError: a process died at every try.

@@ -1,7 +1,7 @@
-"""A frame as a conversation that teaches to see: a picture, and what is in it.
+"""A frame as a training conversation for vision: a picture, and the objects in view.
 
-The answers are in the words in which a dialect tells a scene (:mod:`er_gym.data.scene_text`), and
-the whole scene is told just as the assistant tells it when it plays.
+The answers have the format in which a dialect describes a scene (:mod:`er_gym.data.scene_text`),
+and the description of the whole scene is the same as the assistant's at play.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ class Question:
 def frame_chat(dialect: Dialect, frame: Frame, language: Language = "en") -> Chat:
     """The conversation about a frame.
 
-    The user shows the picture, and the assistant says what it sees; questions about single things
-    come after or before that, so that some are answered by the picture alone. If the frame has a
-    look around, its pictures come last.
+    The user shows the picture, and the assistant lists the objects in view. Questions about single
+    types come before or after the list, so that some can be answered only from the picture. The
+    pictures of a look around, if the frame has one, come last.
 
     Raises:
         ValueError: the dialect lacks the language, or words for frames.
@@ -93,7 +93,7 @@ def _covered(frame: Frame, words: SceneWords) -> PictureRecord:
 
 
 def seen_ahead(frame: Frame) -> Perceived:
-    """What is perceived in the view ahead alone: what is out of reach there is far."""
+    """What is perceived in the view ahead only; objects out of reach count as far."""
     return Perceived(frame.view, {}, "", frame.interactable, frame.interactable)
 
 

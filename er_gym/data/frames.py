@@ -1,4 +1,4 @@
-"""Frames: pictures of rooms with what is truly in view, for teaching a model to see.
+"""Frames: pictures of rooms with the objects in view, to pretrain a model's vision.
 
 ::
 

@@ -1,7 +1,7 @@
 """Reads what er-gym and the paper write in conversations: thoughts in replies, and users' messages.
 
-The reverse of :mod:`er_gym.data.dialects`. Thoughts are told apart by their tags, or by the
-sentences with which a dialect begins thoughts of each kind.
+The reverse of :mod:`er_gym.data.dialects`. Thoughts are split at their tags, or by the sentences
+with which a dialect begins thoughts of each kind.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def user_message(text: str, *, first: bool, shows: bool) -> UserMessage:
 def thoughts_of(reply: str, language: Language, *, first: bool) -> list[ThoughtRecord]:
     """The thoughts in a reply, by their tags or by how they begin.
 
-    What stands before the first is a thought of its own: an analysis in the first reply, else
+    Text before the first of these is a thought, too: an analysis in the first reply, else
     reasoning.
     """
     said = _DECIDED.sub("", reply).strip()

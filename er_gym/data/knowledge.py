@@ -1,4 +1,4 @@
-"""What the agent could know at a turn: all that a thought may be made of or is checked against.
+"""What the agent can know at a turn: writers compose thoughts from it, the critic checks them.
 
 :func:`knowledge_at` reads it from the trajectory's turns alone, so that a thought can be written
 and checked while the episode is played, and checked again from the records.
@@ -36,7 +36,7 @@ class Visit:
 
 @dataclass(frozen=True)
 class LastAction:
-    """The action before this turn and what came of it.
+    """The action before this turn and its result.
 
     Attributes:
         action, success, feedback, fault: as :class:`~er_gym.data.trajectory.Turn` has them.

@@ -1,8 +1,8 @@
 """Finds the object types that a text names, in English and Chinese.
 
-``"the credit card on the coffee table"`` names a CreditCard and a CoffeeTable. A name that several
-types bear, such as "table", stands for all of them: what is said of it is true if it is true of
-one. Names are looked up as whole words, the longest first, so that "desk lamp" is no Desk.
+``"the credit card on the coffee table"`` names a CreditCard and a CoffeeTable. A name of several
+types, such as "table", stands for all of them: a statement about it is true if it is true for one
+of them. Names are looked up as whole words, the longest first, so that "desk lamp" is no Desk.
 """
 
 from __future__ import annotations
@@ -149,8 +149,7 @@ def _plurals(name: str) -> Iterator[str]:
 
 @cache
 def alike(object_type: str) -> frozenset[str]:
-    """The types that one name may stand for without a lie: a Sink and its SinkBasin, an Egg and the
-    EggCracked that was made of it."""
+    """The types that count as one: a Sink and its SinkBasin, an Egg and its EggCracked."""
     others = {other for other in OBJECT_TYPES if same_type(object_type, other)}
     whole = object_type.removesuffix("Sliced").removesuffix("Cracked")
     others |= {whole, f"{whole}Sliced", f"{whole}Cracked"} & {*OBJECT_TYPES}

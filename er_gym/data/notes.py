@@ -1,9 +1,9 @@
 """Notes: thoughts as a short memory, made from what a trajectory records of each turn.
 
 ``goal pickup Apple to Fridge; Apple unseen; looked Sink > Drawer 2; navigate to Drawer 2 in a row;
-next CounterTop`` says what the agent is after, how far it is, where it has looked (in drawers
-twice), how often it has just done the same, and where it means to look. The words are a dialect's
-(:mod:`er_gym.data.dialects`). A small model learns such notes; prose is too much for it.
+next CounterTop`` states the goal, where the object is, the places searched (two drawers), how often
+the last action was repeated, and the place to search next. The words are a dialect's
+(:mod:`er_gym.data.dialects`). A small model can learn such notes, but not to write prose.
 """
 
 from __future__ import annotations
@@ -26,15 +26,14 @@ class NoteWords(BaseModel):
     """The words of notes.
 
     Attributes:
-        goal: what the agent is after, with ``{verb}`` and ``{thing}``; ``to``: the destination,
-            ``{place}``.
-        held, near, view, seen, unseen: how far it is from the thing that it wants now, ``{thing}``:
-            in the hand, within reach, in view, seen before, never seen.
-        looked: where it has looked for it, ``{places}``; ``times``: how a place is named where it
-            has looked more than once, with ``{place}`` and ``{count}``.
+        goal: the goal, with ``{verb}`` and ``{thing}``; ``to``: the destination, ``{place}``.
+        held, near, view, seen, unseen: where the wanted object ``{thing}`` is: in the hand, within
+            reach, in view, seen before, never seen.
+        looked: the places searched for it, ``{places}``; ``times``: how a place is named that was
+            searched more than once, with ``{place}`` and ``{count}``.
         again: that the last ``{count}`` actions, two or more, were all ``{action}``; ``""`` where
             notes do not count that.
-        next: where it means to look, ``{places}``.
+        next: the places to search next, ``{places}``.
         failed: the action that failed just before, ``{action}``.
         separator: stands between the parts.
         places_separator: stands between places. One that stands in no other list is better: a

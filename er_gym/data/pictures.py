@@ -72,7 +72,7 @@ def encode_alike(rgb: NDArray[np.uint8], like: bytes) -> bytes:
 
 
 def difference(recorded: bytes, rgb: NDArray[np.uint8]) -> str:
-    """How a recorded picture differs from one that is drawn now, in words; ``""`` if it does not.
+    """How a recorded picture differs from a newly rendered one, in words; ``""`` if it does not.
 
     The files need not have equal bytes, as other versions of Pillow write others; their pixels must
     be equal.

@@ -1,7 +1,7 @@
-"""Reads a thought: its clauses, what each is about, and in which sense it is said.
+"""Parses a thought: its clauses, their subjects, and whether each states a fact.
 
-A clause claims something as a fact unless it asks, denies, guesses, plans, tells what is usual, or
-what would be.
+A clause states a fact unless it is a question, a negation, a guess, a plan, a condition, or about
+what is usual.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _SPACES = re.compile(r"[ \t\r\f\v]+")
 
 @dataclass(frozen=True)
 class Clause:
-    """A part of a sentence that says one thing.
+    """A part of a sentence that makes one statement.
 
     Attributes:
         text: in lower case, each name a :data:`~er_gym.data.phrases.MARK`.
@@ -51,7 +51,7 @@ class Clause:
 
     @property
     def guessed(self) -> bool:
-        """Whether it claims nothing about how things are."""
+        """Whether it makes no claim about the present state."""
         return self.asks or self.hedged or self.conditional or self.usual
 
     @property

@@ -27,7 +27,7 @@ _LONGEST = 120
 def replay(
     env: Playable, task: Task, trajectory: Trajectory, folder: Path | None = None
 ) -> Iterator[str]:
-    """Do a trajectory's actions again; yield what comes out differently, in a line each.
+    """Repeat a trajectory's actions; yield one line for each difference from the record.
 
     After the first turn with a difference the rest is not compared, since it mostly follows.
 

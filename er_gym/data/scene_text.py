@@ -1,6 +1,6 @@
-"""What an agent perceives in few words, for models without pictures.
+"""The objects that an agent perceives as a short text, for models without vision.
 
-``see CounterTop ( Apple, Mug away ), Fridge closed``: things in brackets lie in or on the thing
+``see CounterTop ( Apple, Mug away ), Fridge closed``: objects in brackets lie in or on the object
 before them. The words are a dialect's (:mod:`er_gym.data.dialects`).
 """
 
@@ -54,14 +54,14 @@ class SceneWords(BaseModel):
     """The words for what is perceived.
 
     Attributes:
-        view: tells the things in view, ``{things}``; ``around``: those seen by looking around, of
-            which none is within reach;
-            ``other``: the types, not told otherwise, that one can navigate to from now on.
-        held: tells what is in the hand, ``{things}``.
-        same: told after an action that has changed nothing of this. ``nothing``: stands where no
-            thing is in view.
-        away: not within reach. ``far``: not even close enough to navigate to. Things without either
-            are within reach.
+        view: lists the objects in view, ``{things}``; ``around``: those seen by looking around, of
+            which none is within reach; ``other``: the types, not listed otherwise, that the agent
+            can navigate to from now on.
+        held: states the object in the hand, ``{things}``.
+        same: used after an action that changed nothing of this. ``nothing``: used if no object is
+            in view.
+        away: not within reach. ``far``: not even close enough to navigate to. Objects without
+            either are within reach.
         open, closed, on, off: states.
     """
 
@@ -82,15 +82,15 @@ class SceneWords(BaseModel):
 
 
 class NamedWords(BaseModel):
-    """The words for how far the things are that the instruction names, told after the scene.
+    """The words for where the instruction's objects are; the line comes after the scene.
 
-    A small model learns slowly to look a name up in a long list, and quickly to repeat what was
-    said of it last.
+    A small model learns slowly to look a name up in a long list, and quickly to copy the last line
+    about it.
 
     Attributes:
-        told: tells them, ``{things}``.
+        told: lists them, ``{things}``.
         held, near, view, hidden: in the hand, within reach, in view, and not in view.
-        at: told of a thing in view that lies in or on another, ``{place}``.
+        at: for an object in view that lies in or on another, ``{place}``.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -136,8 +136,9 @@ class _Thing:
 def scene_text(words: SceneWords, now: Perceived, before: Perceived | None, *, stayed: bool) -> str:
     """What an agent perceives, in lines.
 
-    Objects that would be told alike are told once. After an action on the spot only things that are
-    new or changed are told; after any other, all that are in view, unless nothing has changed.
+    Objects with the same description are listed once. After an action on the spot, only new or
+    changed objects are listed; after any other action all objects in view, unless nothing has
+    changed.
 
     Args:
         words: the dialect's.
@@ -176,7 +177,7 @@ def scene_text(words: SceneWords, now: Perceived, before: Perceived | None, *, s
 
 
 def named_text(words: NamedWords, named: Sequence[str], now: Perceived) -> str:
-    """How far some types are, in a line; ``""`` for none."""
+    """Where objects of some types are, in one line; ``""`` if no type is given."""
     nearest: dict[str, SeenObject] = {}
     for each in (*now.view, *(one for view in now.views.values() for one in view)):
         nearest.setdefault(each.type, each)

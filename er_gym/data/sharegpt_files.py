@@ -5,7 +5,7 @@ Such a file is a list of ``{"messages": [{"role", "content"}, …], "images": ["
 LLaMA-Factory may say what the columns are called. ``<image>`` in a text is the place of a picture.
 The paper's released training file is one.
 
-:func:`open_sharegpt` looks at everything before anything is used; see :class:`Report`.
+:func:`open_sharegpt` checks the whole file before it is used; see :class:`Report`.
 """
 
 from __future__ import annotations

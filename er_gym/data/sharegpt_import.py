@@ -1,8 +1,8 @@
 """Turns ShareGPT files into a collection of trajectories: for statistics, for looking at them, and
 to export them again.
 
-What such a file does not tell stays empty: poses, views, key actions, object ids and rewards. So
-its trajectories cannot be replayed.
+Such a file has no poses, views, key actions, object ids and rewards. These fields stay empty, so
+the trajectories cannot be replayed.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def import_sharegpt(
 
 
 def trajectory_of(chat: Chat) -> Trajectory:
-    """The trajectory that a conversation tells.
+    """The trajectory of a conversation.
 
     Raises:
         ImportFailed: a reply ends in no known action.

@@ -44,7 +44,7 @@ _DECIDED = re.compile(rf"<{DECISION}>([^<>]*)</{DECISION}>[\s.]*\Z")
 
 @dataclass(frozen=True)
 class Sample:
-    """A sample, whatever its columns are called.
+    """A sample, independent of the names of its columns.
 
     Attributes:
         id: ``""`` if it has none.
@@ -116,10 +116,10 @@ class Report:
 
 @dataclass
 class Problems:
-    """Looks at one sample after the other.
+    """Checks one sample after the other.
 
     Attributes:
-        harmless: kinds of problems with which a sample is used all the same.
+        harmless: kinds of problems that do not exclude a sample.
         decode: whether each picture is decoded, once however many samples show it.
     """
 
@@ -136,7 +136,7 @@ class Problems:
     """The hashes of the paths of pictures that were decoded."""
 
     def look(self, index: int, sample: Sample, places: PicturePlaces) -> bool:
-        """Note what is wrong with a sample, and say whether it can be learnt from."""
+        """Count the problems of a sample; returns whether it can be trained on."""
         self.samples += 1
         self.replies += sample.roles.count("assistant")
         self.pictures += len(sample.images)

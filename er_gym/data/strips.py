@@ -1,6 +1,6 @@
 """Draws a trajectory as a strip: for each turn what was seen, thought and done, from top to bottom.
 
-The kinds of thoughts differ in colour and are named, so that no eye depends on the colours.
+The kinds of thoughts differ in colour and are named, so that nobody depends on the colours.
 """
 
 from __future__ import annotations

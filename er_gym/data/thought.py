@@ -1,4 +1,4 @@
-"""A thought that is being checked, and what is known about what it speaks of."""
+"""A thought that is being checked, and what the agent knows about its objects."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Refusal:
 
     Attributes:
         code: the sort of fault, such as ``unseen``, ``side``, ``state``, ``decision``.
-        detail: a sentence that a writer can act on: what was claimed, and what is so.
+        detail: a sentence for the writer: what was claimed, and what is true.
     """
 
     code: str

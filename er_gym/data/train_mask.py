@@ -1,4 +1,4 @@
-"""Which tokens of a conversation are learnt: for collators of trainers without a flag per turn."""
+"""Which tokens of a conversation get loss: for collators of trainers without a flag per turn."""
 
 from __future__ import annotations
 

@@ -129,13 +129,13 @@ class ThoughtRecord(_Record):
 
 
 class Subgoal(_Record):
-    """What the agent is after at a turn.
+    """The agent's current goal at a turn.
 
     Attributes:
         verb: what is to be done to ``thing``: ``find`` or a verb of the environment.
         thing: the type of the object that it is about; with ``put in``, the object to be put.
-        place: the type of the destination that the instruction names, ``""`` for none. Once the
-            thing is in the hand, this is what is searched for or gone to.
+        place: the type of the destination that the instruction names, ``""`` for none. Once
+            ``thing`` is in the hand, the agent searches for ``place`` or goes to it.
         text: the part of the instruction that it belongs to, in a task of several parts.
     """
 
@@ -146,7 +146,7 @@ class Subgoal(_Record):
 
 
 class Turn(_Record):
-    """What the agent perceived, thought and did at one step, and what came of it.
+    """What the agent perceived, thought and did at one step, and the result.
 
     Attributes:
         pictures: what it was shown. Empty if its last action failed and nothing changed.
@@ -155,8 +155,8 @@ class Turn(_Record):
         held: the type of the object in its hand, ``""`` for none.
         navigable, interactable: the object types that were legal targets.
         at: the type that it last navigated to, ``""`` at first.
-        purpose, subgoal, plan: why it acts; ``plan`` lists the places that it still means to
-            search, in order, the place of this turn's action first.
+        purpose, subgoal, plan: the reasons for the action; ``plan`` lists the places that it plans
+            to search, in order, the place of this turn's action first.
         thoughts: in the order in which it thought them.
         verb, object_type: the action.
         object_id: the object that the action was done to, ``""`` for none.
@@ -165,7 +165,7 @@ class Turn(_Record):
         feedback: what the environment answered.
         fault: the fault that the environment injected into the action, ``""`` for none
             (:mod:`er_gym.envs.faults`).
-        train: whether the turn is to be learnt from.
+        train: whether the turn is trained on.
     """
 
     pictures: list[PictureRecord] = []
@@ -286,7 +286,7 @@ class Trajectory(_Record):
 
 
 def with_results(turns: list[Turn], faults: list[str], episode: EpisodeRecord) -> list[Turn]:
-    """Turns with what came of each action, read from the episode's record.
+    """Turns with the result of each action, read from the episode's record.
 
     Args:
         turns: one for each step that the agent took.

@@ -118,10 +118,10 @@ def verify(
 
 
 def thought_problems(trajectory: Trajectory) -> Iterator[str]:
-    """What the critic has against a trajectory's thoughts, in a line each.
+    """The critic's objections to a trajectory's thoughts, one line each.
 
-    Where a model decided and thought in one reply, its thoughts stand as they are. There it is a
-    problem if the record does not say what the critic has against them.
+    If a model decided and thought in one reply, its thoughts are kept as they are. Then it is a
+    problem only if the record lacks an objection of the critic.
     """
     quotes = trajectory.kind in _QUOTING
     for index, turn in enumerate(trajectory.turns):

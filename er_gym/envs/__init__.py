@@ -1,1 +1,1 @@
-"""The Gymnasium face: :class:`~er_gym.envs.embodied_env.EmbodiedEnv` and its parts."""
+"""The Gymnasium interface: :class:`~er_gym.envs.embodied_env.EmbodiedEnv` and its parts."""

@@ -114,8 +114,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     a row that names no known action (such a reply costs no step). It truncates at ``max_steps``;
     placing the agent counts as the first step. A limit of Gymnasium's, as
     ``gymnasium.make(…, max_episode_steps=…)`` sets it, counts the calls of ``step``; the
-    environment learns of it at ``reset``, and the lower limit holds. ``info["end_reason"]`` names
-    the reason, and ``info["max_steps"]`` the step limit.
+    environment reads it at ``reset``, and the lower of the two limits holds. ``info["end_reason"]``
+    names the reason, and ``info["max_steps"]`` the step limit.
 
     ## Copies and Threads
     ``copy.deepcopy`` and ``pickle`` keep the episode: a new copy replays the task's actions and
@@ -312,7 +312,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
 
     @property
     def details(self) -> Details:
-        """What stands behind the last observation and ``info``: see :class:`.info.Details`."""
+        """er-gym's own objects of the last step, beside ``info``: see :class:`.info.Details`."""
         with self._lock:
             return self._current("asking for the details").details
 

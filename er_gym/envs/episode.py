@@ -132,7 +132,7 @@ class Episode:
 
     @property
     def fingerprint(self) -> tuple[Any, ...]:
-        """A value that differs between two courses of an episode."""
+        """A value that shows whether a replay has diverged: pose, steps, end and known types."""
         return self.perception.pose, self._steps, self.end_reason, self._known.names
 
     @property
@@ -356,7 +356,7 @@ class Episode:
 
     @property
     def details(self) -> Details:
-        """What stands behind the last observation and ``info``; made anew each time."""
+        """er-gym's own objects of the last step, which ``info`` lacks; made anew by each call."""
         situation = self._situation
         details: Details = {
             "task": self.task,

@@ -1,14 +1,14 @@
 """Faults: actions that go wrong once, as those of a real robot do.
 
-A fault is injected into a legal action before it is carried out. ``navigate to`` arrives elsewhere;
-of an interaction, the arm fails and nothing changes. The action counts as not done, and the
-feedback says in plain words what came of it. An agent can thus notice the fault and try again.
+A fault is injected into a legal action before it is carried out. ``navigate to`` arrives at another
+place; in an interaction the arm fails and nothing changes. The action counts as not done, and the
+feedback describes the result in words. An agent can thus notice the fault and try again.
 
 Rules:
 
 - Each action of a kind goes wrong with the probability that the rates give for the kind.
 - After two faults in a row, the same action is carried out. Other actions in between do not count,
-  so every third try at the latest goes through, at any rate.
+  so the third try is always carried out, at any rate of faults.
 - What goes wrong depends only on the seed of the episode, on the rates, and on the actions taken.
 """
 

@@ -1,7 +1,7 @@
-"""What ``reset`` and ``step`` return as ``info``, and what stands behind the environment.
+"""What ``reset`` and ``step`` return as ``info``, and what the environment offers beside it.
 
-:class:`Info` is plain data of one form, from ``reset`` to the last step. It goes through
-Gymnasium's wrappers and vector environments, and into data sets. :class:`Details` has the rest:
+:class:`Info` is plain data with the same keys and types, from ``reset`` to the last step. So
+Gymnasium's wrappers, vector environments and data sets can store it. :class:`Details` has the rest:
 er-gym's own objects, lists whose length changes, pictures. ``env.unwrapped.details`` returns it,
 and :func:`with_details` joins both for the agents that need it.
 """
@@ -130,9 +130,9 @@ class Info(TypedDict):
 
 
 class Details(TypedDict):
-    """What stands behind the environment after ``reset`` and each step: ``env.unwrapped.details``.
+    """What the environment offers beside ``info`` at each step: ``env.unwrapped.details``.
 
-    No name is one of :class:`Info`, so both can be joined (:func:`with_details`).
+    No key is one of :class:`Info`, so both can be joined (:func:`with_details`).
     """
 
     task: Task

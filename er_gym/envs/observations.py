@@ -1,7 +1,7 @@
 """What the agent perceives: small builders, each with its own Gymnasium space.
 
-``state`` and ``text`` say nothing that an agent could not know from what it has seen, been told and
-done.
+``state`` and ``text`` contain only what an agent can know from the instruction and from what it has
+seen and done.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""The step limit that Gymnasium has put around an environment, as the environment learns it.
+"""Reads the step limit of a ``TimeLimit`` that Gymnasium has wrapped around an environment.
 
-``gymnasium.make(ID, max_episode_steps=5)``, a spec with a limit and a ``TimeLimit`` by hand wrap
-the environment, and tell it nothing: it would promise the agent more steps than there are. A
-wrapper cannot be asked from inside. But each ``reset`` comes through it, so the callers are looked
-through.
+``gymnasium.make(ID, max_episode_steps=5)`` and a spec with a limit wrap the environment in a
+``TimeLimit``, as a user can. The environment does not know its wrappers, so it would report more
+steps left than there are. But the wrapper's ``reset`` calls the environment's ``reset``, so the
+limit is found by searching the call stack for it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The paper's protocol: what its evaluation program understands, allows and does.
 
-The rules are those of Embodied-Reasoner's runner and agent (arXiv 2503.21696, ``evaluate/``). Odd
-rules are kept, too, so that numbers compare with the paper's table.
+The rules are those of Embodied-Reasoner's runner and agent (arXiv 2503.21696, ``evaluate/``). Its
+odd rules are reproduced, too, so that results are comparable with the paper's table.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def understand_as_paper(action: AnyAction, objects: ObjectTable) -> tuple[Action
 
 
 class PaperActionHandler:
-    """The paper's way to judge and carry out actions.
+    """The paper's rules by which actions are judged and carried out.
 
     - The agent may navigate to a type that has been clearly visible, or that the task lists.
     - The agent may interact with a type in any way while one of its objects is clearly visible, or

@@ -1,8 +1,8 @@
 """A space of texts that ``AsyncVectorEnv`` can share.
 
-Gymnasium reads texts in shared memory once, when it makes the vector environment, so that every
-observation would be the empty text of that moment. Here a batch of texts is a view of the memory,
-as a batch of arrays is one there.
+For its own text space, Gymnasium decodes the shared memory only once, when it makes the vector
+environment; every later observation would be that empty text. Here a batch of texts is a view of
+the shared memory, as a batch of arrays is in Gymnasium.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ class TextSpace(spaces.Text):
 
 
 class SharedTexts(Sequence[str]):
-    """The texts of n environments in shared memory, as they are when they are read.
+    """The texts of n environments, a view of shared memory: each access decodes the present text.
 
-    ``copy.deepcopy`` gives the texts of now, as a tuple. ``AsyncVectorEnv`` does that unless it is
-    made with ``copy=False``.
+    ``copy.deepcopy`` returns the present texts as a tuple. ``AsyncVectorEnv`` does that unless it
+    is made with ``copy=False``.
 
     Args:
         memory: (n, size) uint8: the ASCII characters of each text, then zeros.

@@ -39,10 +39,11 @@ class Decision:
     Attributes:
         action: anything that ``EmbodiedEnv.step`` takes: an :class:`~er_gym.envs.actions.Action`,
             its text, or its index.
-        thought: the agent's reasoning; it goes into the episode's record, not to the environment.
+        thought: the agent's reasoning; it is written into the episode's record, and the environment
+            ignores it.
         reply: the cost of the model's reply, if the agent asks a model.
         by: who decided in place of the agent; ``""`` if nobody did.
-        causes: what was amiss with the reply, by names of :data:`er_gym.rollout.causes.CAUSES`.
+        causes: why the reply was not usable, by names of :data:`er_gym.rollout.causes.CAUSES`.
     """
 
     action: Action | str | int
@@ -114,10 +115,10 @@ def check_observation(agent: Agent, obs: Mapping[str, Any]) -> None:
 
 @runtime_checkable
 class CanBeOverruled(Protocol):
-    """An agent that plays on after a step that somebody else decided in its place."""
+    """An agent that can continue after a person has decided a step in its place."""
 
     def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-        """Somebody else decides this step; called in place of ``act``, with what ``act`` would get.
+        """A person decides this step; called in place of ``act``, with its arguments.
 
         The next ``act`` gets the result, as if the agent had decided it.
         """

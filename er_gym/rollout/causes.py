@@ -1,7 +1,7 @@
-"""What was amiss with the replies of a model: what records name as a cause, in words.
+"""The causes of unusable replies and failed episodes, and what to do about each.
 
 An agent names the causes of each decision, and the cause of an episode that it cannot finish. This
-table says what a name means and what to do. :func:`count_causes` counts the names in records, for
+table says what a cause means and what to do. :func:`count_causes` counts the names in records, for
 the end of a run, for reports and for the monitor.
 """
 
@@ -34,8 +34,8 @@ class Cause:
 
     Attributes:
         name: in records.
-        means: what happened, after "of 20 replies" or "of 20 episodes".
-        do: what the user can do, in words after a colon.
+        means: what happened; follows "of 20 replies" or "of 20 episodes" in a sentence.
+        do: what the user can do; follows a colon in the sentence.
         settings: the agent's settings that decide it, by path.
     """
 

@@ -110,7 +110,7 @@ class RemoteEnv:
 
     Attributes:
         lost: the exception that ended the environment, None while it can be used.
-        details: what stands behind the last ``info``: :class:`er_gym.envs.info.Details`.
+        details: er-gym's own objects of the last step: :class:`er_gym.envs.info.Details`.
 
     Raises:
         EnvLost: the process died or got stuck; from any method but ``close``.

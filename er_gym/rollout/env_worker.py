@@ -30,10 +30,10 @@ class EnvLost(Exception):
 
     Attributes:
         exitcode: the exit code of the process, minus the signal's number if a signal ended it; None
-            if nobody knows.
+            if it is unknown.
         at_fault: whether this environment may have killed the process: the process died while it
-            worked on this environment, or on none. It is False for the neighbours of the culprit.
-        why: what is known beyond the exit code.
+            worked on this environment, or on none. It is False for the other environments of the
+        process. why: what is known beyond the exit code.
     """
 
     def __init__(self, exitcode: int | None, at_fault: bool, why: str = "") -> None:
@@ -48,7 +48,7 @@ class EnvWorker(Protocol):
 
     @property
     def alive(self) -> bool:
-        """Whether it can be asked."""
+        """Whether the worker still runs."""
 
     def ask(self, slot: int, request: bytes, deadline: float) -> bytes:
         """Its answer to a request (:func:`request_to`) for the environment of a slot.
@@ -58,7 +58,7 @@ class EnvWorker(Protocol):
         """
 
     def dismiss(self) -> None:
-        """Tell it to end; asking it then raises EnvLost."""
+        """Tell the worker to end; :meth:`ask` raises EnvLost from then on."""
 
     def end(self) -> EnvLost:
         """Wait until it has ended, by force if it takes long; says how it ended."""

@@ -6,7 +6,7 @@ skip. Progress bars, trainers and viewers read the stream. Results come from the
 never from the stream. Times are seconds since the epoch (UTC).
 
 The events of an episode name its task. If a worker process dies, its episode begins again: a second
-``episode_begun`` of a task makes the events of its first course void.
+``episode_begun`` of a task makes the events of its first try void.
 
 A change that an older reader would misread takes a new ``format`` in ``run_begun``.
 """
@@ -56,7 +56,7 @@ class RunBegun(_Event):
 
 
 class EpisodeBegun(_Event):
-    """The agent has been placed in a scene and told its task.
+    """The agent has been placed in a scene and has got its task.
 
     Attributes:
         max_steps: the step limit; placing the agent counts as the first step.
@@ -124,7 +124,7 @@ class EpisodeEnded(GrownRecord, _Event):
         steps: the number of steps that the agent took.
         seconds: wall-clock time.
         error: the error it crashed with, in one line; ``""`` if it did not crash.
-        replies, causes, unusable, ended: what was amiss, as
+        replies, causes, unusable, ended: its causes, as
             :class:`er_gym.rollout.causes.EpisodeCauses` has it.
     """
 
@@ -218,8 +218,7 @@ class EventLog:
             listener(event)
 
     def append(self, events: Iterable[Event]) -> None:
-        """Append events that happened elsewhere. The listeners, which hear of a process's own
-        events, are not called."""
+        """Append events of another process, without calling the listeners."""
         for event in events:
             with contextlib.suppress(OSError):
                 self._lines.add(event.model_dump_json())
@@ -234,8 +233,8 @@ def read_events(directory: Path, kinds: Sequence[str] = ()) -> Iterator[Event]:
 
     Args:
         directory: the run directory.
-        kinds: no others are wanted, such as ``"episode_ended"``; most events are steps, and to
-            parse them takes most of the time.
+        kinds: yield only events of these kinds, such as ``"episode_ended"``, which is faster: most
+            events are steps. Empty for all kinds.
     """
     try:
         data = (directory / EVENTS).read_bytes()

@@ -71,7 +71,7 @@ class EpisodeSink(Protocol):
         """Write an episode into the run directory. Saving it twice does no harm."""
 
     def ended(self, played: PlayedEpisode) -> None:
-        """Count an episode that has been saved, and tell the listeners."""
+        """Count an episode that has been saved, and call the listeners."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,8 @@ class Parallelism:
         concurrency: the number of episodes at once, at least 1, for executors that play several
             episodes in one process.
         deadline: seconds within which an environment in another process must answer. The time
-            includes the wait for its neighbours in that process. The process is killed after it.
+            includes the wait for the other environments of that process. When it is over, the
+            process is killed.
         machines: where the worker processes run.
 
     Raises:
@@ -148,7 +149,7 @@ class EpisodeSettings:
         return episode_seed(self.manifest.seed, task.id) if own is None else own
 
     def unbegun(self, task: Task, error: str) -> EpisodeRecord:
-        """The record of an episode that crashed before its environment told the step limit."""
+        """The record of an episode that crashed before the step limit was known."""
         return record_episode(
             task,
             agent=self.manifest.agent,

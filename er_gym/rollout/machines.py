@@ -44,8 +44,8 @@ class Machines(Protocol):
             jobs: as there.
             workers: as there.
             tries: as there.
-            room: what a worker has warm once it has done a job; jobs of one room go to one worker
-                where that costs no time.
+            room: the room that a worker has loaded once it has done a job; jobs of one room go to
+                one worker where that costs no time.
         """
 
     def start_env_worker(self, slots: Sequence[int], env: Mapping[str, Any]) -> EnvWorker:

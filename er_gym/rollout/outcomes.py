@@ -1,9 +1,9 @@
-"""How episodes are counted: what a success is, and of how many.
+"""How a run's success rate is computed: which episodes count, and which are a success.
 
 The rate of success of a run is over the episodes that its records hold, each counted once, by its
 latest result. An episode that crashed is a failure until it has been played again. Episodes under
 way or still to be played, tasks that were set aside and files that are no episodes are not counted.
-Progress, reports, pages and trackers all count by this file.
+Progress, reports, pages and trackers all use this module.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ class Outcomes:
         return found
 
     def add(self, key: str, success: bool, error: str) -> None:
-        """An episode has come out, perhaps once more; ``error`` is "" if it did not crash."""
+        """Count an episode's result; a later one replaces it. ``error`` is "" if it did not
+        crash."""
         self._success[key] = succeeded(success, error)
         self._crashed.discard(key)
         if error:
@@ -43,7 +44,7 @@ class Outcomes:
 
     @property
     def n(self) -> int:
-        """How many episodes have come out."""
+        """How many episodes have a result."""
         return len(self._success)
 
     @property
@@ -61,7 +62,7 @@ class Outcomes:
         """Successes / n.
 
         Raises:
-            ValueError: no episode has come out.
+            ValueError: no episode has a result.
         """
         if not self.n:
             raise ValueError("no episodes: a rate needs at least one")

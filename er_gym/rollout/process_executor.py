@@ -1,4 +1,4 @@
-"""The executor for agents that compute: whole episodes in worker processes, here or on a cluster.
+"""The executor for agents that use the CPU: whole episodes in worker processes.
 
 Workers append events to the run's stream where they can, and write the files that agents leave.
 Workers on other machines send both along with the episode. The caller's process alone writes

@@ -26,7 +26,7 @@ GRACE_SECONDS = 5.0
 
 
 class Terminated(SystemExit):
-    """SIGTERM has come: the process is to end, whatever is called in it."""
+    """Raised on SIGTERM: the process must end, whatever code is running in it."""
 
 
 def start_process(target: Callable[..., None], *args: Any) -> SpawnProcess:

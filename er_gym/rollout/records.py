@@ -45,7 +45,7 @@ class _Record(BaseModel):
 
 
 class GrownRecord(_Record):
-    """A record that has got fields since it was first written.
+    """A kind of record to which later versions of er-gym have added fields.
 
     Attributes:
         added: the names of these fields. Where one has its default, the record is written without
@@ -112,7 +112,7 @@ class StepRecord(GrownRecord):
         appended: whether the protocol took the step instead of the agent: the ``end`` that the
             paper's runner appends (:data:`er_gym.envs.protocol.PAPER`).
         by: who decided the step in place of the agent; ``""`` if nobody did.
-        causes: what was amiss with the model's reply, by names of
+        causes: why the model's reply was not usable, by names of
             :data:`er_gym.rollout.causes.CAUSES`.
     """
 

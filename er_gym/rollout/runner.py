@@ -94,10 +94,10 @@ def _finished(directory: RunDirectory, wanted: Container[str]) -> Iterator[Episo
 
 
 def tell_late(directory: RunDirectory) -> None:
-    """Append the events of results that the stream does not tell of.
+    """Append the events that are missing in the stream for results in the records.
 
-    A process that was killed between a record and its event leaves such a result. Whoever follows
-    the stream would never hear of it.
+    A process that was killed after writing a record and before its event leaves such a result.
+    Without this, programs that follow the stream would never get the event.
     """
     told = {
         event.task_id: (event.success, event.error)

@@ -1,7 +1,7 @@
-"""The executor for agents that mostly wait: a thread for each episode, engines in other processes.
+"""The executor for agents that wait for a model: a thread for each episode, engines elsewhere.
 
-It suits agents that ask a server, or a model in this process. While one agent waits for its reply,
-the engines of the others work.
+It suits agents that use a server, or a model in this process. The engines run in worker processes.
+While one agent waits for its reply, the engines of the others work.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 In ``concurrent.futures``, a killed process loses all running jobs, and nothing says which job was
 at fault. Here each worker has a pipe of its own and holds one job at a time. The pool thus knows
-the job, tries it again, and leaves the other jobs alone. (Pebble's pool knows the job, too, but
-neither tries it again nor starts its processes by :mod:`er_gym.rollout.processes`.)
+which job was lost, tries it again, and does not disturb the other jobs. (Pebble's pool knows the
+job, too, but neither tries it again nor starts its processes by :mod:`er_gym.rollout.processes`.)
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ class LostJob:
     Attributes:
         tries: the number of tries.
         exitcode: the exit code of the last worker, minus the signal's number if a signal ended it;
-            None if nobody knows.
-        why: what is known beyond the exit code.
+            None if it is unknown. why: what is known beyond the exit code.
     """
 
     tries: int

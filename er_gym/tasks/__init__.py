@@ -1,4 +1,4 @@
-"""What is asked of an agent: tasks, their types, their files and suites."""
+"""Tasks for an agent: their types, files and suites, and the judge of an episode."""
 
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.suites import Suite, load_suite, suite_from_file, suite_names

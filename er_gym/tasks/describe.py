@@ -1,4 +1,4 @@
-"""A task as plain text for people."""
+"""A task as plain text."""
 
 from __future__ import annotations
 

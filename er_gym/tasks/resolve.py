@@ -84,9 +84,9 @@ def resolve_tasks(
     Args:
         tasks: the tasks.
         backend: a name that :func:`~er_gym.thor.make_controller` knows.
-        arrange: whether to set up every arrangement on the backend. Otherwise the poses of an
-            arrangement decide, which is quicker, and the backend sets up only those arrangements
-            whose poses leave a question open.
+        arrange: whether to set up every arrangement on the backend. Otherwise ids are resolved from
+            the poses of an arrangement, which is quicker, and the backend sets up only the
+            arrangements for which this is not conclusive.
 
     Raises:
         BackendError: the backend cannot be started.

@@ -89,7 +89,7 @@ _ENV_ID = re.compile(r"[\w.-]+-v\d+")
 
 
 def listen(tell: Callable[[TaskType], None]) -> None:
-    """Call ``tell`` with every present row now, and with every added row later."""
+    """Call ``tell`` now with every present row, and later with every row as it is added."""
     for row in tuple(BY_NAME.values()):
         tell(row)
     _listeners.append(tell)
@@ -205,7 +205,7 @@ def canonical_names(names: Iterable[str]) -> tuple[str, ...]:
 def shares_by_name(shares: Mapping[str, int]) -> dict[str, int]:
     """Whole numbers by type, where the keys are any names.
 
-    The number of a group is dealt out evenly to its types, the first ones getting what is over.
+    The number of a group is divided evenly among its types; the first types get the remainder.
 
     Raises:
         ValueError: a name is unknown, or two name the same type.

@@ -16,7 +16,7 @@ _LONGEST_PART = 255
 
 
 class OutsideFolder(ValueError):
-    """A name leads out of the folder that it belongs into; nothing was read or written."""
+    """A name leads out of the folder that it must stay in; nothing was read or written."""
 
 
 def inside(folder: Path, name: str | PurePath, *, links: bool = True) -> Path:

@@ -1,4 +1,4 @@
-"""Files that the user named: what er-gym did not write is replaced only if it is told to."""
+"""Output files that the user names: foreign files are replaced only with ``force``."""
 
 from __future__ import annotations
 

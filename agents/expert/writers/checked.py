@@ -1,4 +1,4 @@
-"""A writer whose thoughts the critic has passed."""
+"""A writer all of whose thoughts the critic has accepted."""
 
 from __future__ import annotations
 

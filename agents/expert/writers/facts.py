@@ -1,4 +1,4 @@
-"""What is known at a turn, as facts for the grammar of wordings.
+"""The agent's knowledge at a turn, as facts for the grammar of wordings.
 
 Facts that the wordings use (``configs/thoughts``):
 

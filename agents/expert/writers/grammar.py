@@ -11,11 +11,10 @@ A rule is a block of lines in a YAML file; each line is an alternative. In a lin
   facts;
 - ``{?fact}`` and ``{!fact}`` say that the line needs a fact, or must not have it.
 
-A line that needs what is not there is passed over, and so is, where there are others, a line that
-the same writing has used already. A line that begins with ``~`` is used only if no other can be. A
-rule can be a mapping instead, ``by`` with the name of a fact
-and a block for each of its values; the value ``else`` stands for all others, and
-for those whose lines cannot be filled.
+A line is skipped if a fact or pool that it needs is missing. A line that the same writing has used
+already is used again only if there is no other. A line that begins with ``~`` is used only if no
+other can be. A rule can be a mapping instead, ``by`` with the name of a fact and a block for each
+of its values; the value ``else`` stands for all others, and for those whose lines cannot be filled.
 """
 
 from __future__ import annotations
@@ -51,7 +50,7 @@ class Writing:
         nouns: the words for object types.
         random: makes all choices.
         fullness: the probability of an optional part, 0 to 1.
-        used: the lines used so far, so that none is used twice if others will do.
+        used: the lines used so far; they are used again only if there are no others.
         mentioned: the object types taken from pools so far.
     """
 

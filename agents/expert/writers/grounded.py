@@ -26,7 +26,7 @@ _HAN = re.compile(r"[一-鿿]")
 class GroundedWriter:
     """Composes thoughts from a grammar of wordings and the facts of a turn.
 
-    It says nothing that the request's knowledge does not hold. Equal requests get equal texts. The
+    It states only what the request's knowledge contains. Equal requests get equal texts. The
     wordings are data, in ``configs/thoughts``.
     """
 

@@ -1,4 +1,4 @@
-"""A model writes the thoughts, and the critic reads them before anybody else does."""
+"""A writer that asks a model for the thoughts; the critic checks them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What came of the last action, as a word for the grammar of wordings."""
+"""The result of the last action, as a keyword for the grammar of wordings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a model is told when it writes thoughts or names places: ``configs/prompts/expert``."""
+"""The prompts for a model that writes thoughts or names places: ``configs/prompts/expert``."""
 
 from __future__ import annotations
 

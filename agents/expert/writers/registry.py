@@ -13,7 +13,7 @@ from er_gym.plugins import PluginError, Registry, reason
 
 
 def checked_grounded() -> ThoughtWriter:
-    """The grounded writer, whose thoughts the critic has passed."""
+    """The grounded writer, with the critic's check of its thoughts."""
     return CheckedWriter(GroundedWriter())
 
 

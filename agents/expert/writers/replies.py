@@ -63,7 +63,7 @@ def read_thought(reply: Reply, kind: ThoughtKind, limit: int) -> ReadThought:
 
 @dataclass(frozen=True)
 class OwnWords:
-    """Checks that a thought is in words of its own, and in the robot's voice.
+    """Checks that a thought does not copy the prompt, and speaks as the robot.
 
     Attributes:
         prompts: runs of words of the prompts' own texts.
@@ -77,7 +77,7 @@ class OwnWords:
         return cls(frozenset(run for text in texts for run in _runs(text)))
 
     def refusals(self, text: str) -> tuple[Refusal, ...]:
-        """What a model says that copies its instructions, as small models do."""
+        """Refusals of a thought that copies the instructions, as small models do."""
         found = []
         if any(run in self.prompts for run in _runs(text)):
             found.append(Refusal("echo", "This repeats what you were told; use your own words."))

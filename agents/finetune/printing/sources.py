@@ -1,4 +1,4 @@
-"""What the printed files train on: conversations of a collection or of a ShareGPT file."""
+"""The training data of printed files: conversations of a collection or of a ShareGPT file."""
 
 from __future__ import annotations
 
@@ -164,8 +164,8 @@ class SourceJob(ExportJob):
 
 
 def released(chat: Chat) -> Chat:
-    """The conversation in which all turns after the first ``<|feedback|>`` are learnt, or all if
-    there is none: the mask of the paper's released code."""
+    """The conversation with loss on all turns after the first ``<|feedback|>``, or all if there is
+    none: the mask of the paper's released code."""
     first = next(
         (
             place

@@ -1,4 +1,4 @@
-"""TRL: a script for ``SFTTrainer`` with a collator that heeds each turn's flag, and its YAML."""
+"""TRL: a script for ``SFTTrainer`` with a collator that uses each turn's flag, and its YAML."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ class Memory:
 class SearcherAgent:
     """Parses the instruction, searches likely places, and acts once an object is within reach.
 
-    It uses the instruction and what the environment tells every agent: the visible and the held
+    It uses the instruction and the ``info`` that every agent gets: the visible and the held
     objects, the navigable and the interactable types, and the legal actions. It does not read the
     task's key actions or goal, nor which object an action affected.
 
@@ -126,11 +126,11 @@ class SearcherAgent:
         return Decision(action, self._thought)
 
     def watch(self, action: Action, info: Mapping[str, Any]) -> None:
-        """See another agent decide, before the first :meth:`act`: it will go on from there.
+        """Take in a step of another agent; the first :meth:`act` continues from there.
 
         Args:
             action: what the other agent does next.
-            info: what the environment told before.
+            info: the environment's answer before the action.
         """
         self._take_result(info)
         self._remember(action)

@@ -118,7 +118,7 @@ class SteppedJobs(Generic[Job, State, Result]):
             raise
 
     def close(self) -> None:
-        """End the thread after the step at hand; waiting callers get CannotGoOn."""
+        """End the thread after the current step; waiting callers get CannotGoOn."""
         with self._lock:
             self.closed = True
             self.waiting.put(None)  # wakes the thread

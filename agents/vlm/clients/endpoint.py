@@ -1,4 +1,4 @@
-"""One server of a model: its address, its connections, its pace, and whether it is there."""
+"""One server of a model: its address, connections, rate limit and health checks."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Endpoint:
             return error
 
     def is_up(self, request: Request) -> bool:
-        """Whether the server answers a request for its models, be it with a refusal."""
+        """Whether the server answers a request for its models, even with a refusal."""
         self.transport.begin_try(request, self._look)
         try:
             self._sdk.get("/models", cast_to=httpx2.Response, options=self._options)

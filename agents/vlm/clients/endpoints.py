@@ -1,12 +1,12 @@
-"""The servers of one model: who gets a request, who is set aside, and who is back.
+"""The servers of one model: which gets a request, and which are set aside or used again.
 
 A request goes to the server with the fewest requests under way. A server that gives no answer, or
 fails with 5xx, is set aside and asked for its list of models now and then. If it answers, one
 request is sent to it on trial; a reply puts it back in use. A server that asks to wait is set aside
 for that time. A server that refuses every request is set aside for good.
 
-While all of them are set aside, requests are sent all the same, with the waits and tries that a
-single server gets. A single server is never set aside.
+While all of them are set aside, requests are still sent, with the waits and tries of a single
+server. A single server is never set aside.
 """
 
 from __future__ import annotations

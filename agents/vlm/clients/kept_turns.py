@@ -1,4 +1,4 @@
-"""Keeps what a model has computed for the earlier turns of conversations, for their next turns.
+"""Caches keys and values of the earlier turns of conversations, for their next turns.
 
 What a transformer computes for a token are a key and a value in each layer; later tokens need
 nothing else of it. A turn of a conversation repeats all turns before it, so their keys and values
@@ -102,7 +102,7 @@ class KeptTurns:
 
 
 class KeptConversations:
-    """The kept turns of conversations, those last used; thread-safe.
+    """The cached turns of the most recently used conversations; thread-safe.
 
     Args:
         limit: the most bytes.
@@ -119,7 +119,7 @@ class KeptConversations:
             return self._kept.pop(name, None)
 
     def keep(self, name: str, turns: KeptTurns) -> None:
-        """Keep the turns of a conversation; the conversations last used make room."""
+        """Keep the turns of a conversation; the least recently used conversations are dropped."""
         with self._lock:
             self._kept.pop(name, None)
             self._kept[name] = turns
@@ -128,7 +128,7 @@ class KeptConversations:
                 total -= self._kept.popitem(last=False)[1].size
 
     def clear(self) -> None:
-        """Keep none any longer."""
+        """Drop all conversations."""
         with self._lock:
             self._kept.clear()
 

@@ -1,6 +1,6 @@
 """The agent ``human``: it leaves the record that a vision-language agent leaves, without a model.
 
-A person is told what such an agent is told of its actions, and is shown the same pictures.
+A person gets the same feedback and the same pictures as such an agent.
 """
 
 from __future__ import annotations

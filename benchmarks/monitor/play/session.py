@@ -181,7 +181,7 @@ class Session:
             return self._give(action)
 
     def order(self, order: Order) -> Moment:
-        """The person asks for something else.
+        """Take an order of the person.
 
         Returns:
             The moment before.

@@ -1,4 +1,4 @@
-"""What a person is shown of an episode: what the environment tells every agent, and no more."""
+"""What a person sees of an episode: the same as every agent, and no more."""
 
 from __future__ import annotations
 

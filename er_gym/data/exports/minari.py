@@ -1,7 +1,7 @@
 """Minari: state observations and actions, for offline reinforcement learning.
 
 Trajectories hold no state vectors, so each is played again in the environment that it was collected
-in. One that does not turn out as recorded is left out and counted.
+in. One whose replay differs from the record is left out and counted.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Reads the paper's raw trajectories (:mod:`er_gym.data.exports.paper` says how they are laid out).
 
-What the layout has no place for is worked out where that can be done: an action was done unless the
-turn after it has no picture; it earned a key action's reward if it is that key action.
+Two fields that the layout lacks are inferred: an action was done unless the turn after it has no
+picture, and it earned a key action's reward if it is that key action.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """verl: Parquet with messages and pictures, for its multi-turn SFT dataset.
 
-All turns of the assistant are learnt, and there is no flag for a turn. Turns that are not learnt
-are told by the user instead (:func:`er_gym.data.chat.told_by_user`).
+All turns of the assistant are learnt, and there is no flag for a turn. Turns that get no loss are
+quoted in the user's messages instead (:func:`er_gym.data.chat.told_by_user`).
 """
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
-"""Wrappers: the instruction as a vector, a reward that tells more, actions that go wrong, and
-``info`` without words.
+"""Wrappers: the instruction as a vector, reward shaping, faults, and ``info`` without texts.
 
 ::
 
@@ -7,7 +6,7 @@
     env = KeyActionShaping(InstructionEmbedding(env), gamma=0.99)
 
 Each works on what ``gymnasium.make`` returns and on an ``EmbodiedEnv`` as it is, in any order.
-Nothing heavy is imported before an encoder that needs it is made.
+Large packages are imported only when an encoder that needs them is made.
 """
 
 from er_gym.envs.wrappers.encoders import Encoder, make_encoder

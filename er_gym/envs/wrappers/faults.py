@@ -1,4 +1,4 @@
-"""Faults in an environment that was made without them."""
+"""A wrapper that adds faults to an environment that was made without them."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from er_gym.envs.wrappers.base import TaskWrapper
 class FaultInjection(TaskWrapper, RecordConstructorArgs):
     """Lets actions go wrong, as ``EmbodiedEnv(faults=…)`` does (:mod:`er_gym.envs.faults`).
 
-    The wrapper only tells the environment how often. Its rates take the place of those with which
-    the environment was made, and hold from the next ``reset`` on.
+    The wrapper only sets the environment's fault rates. They replace the rates with which the
+    environment was made, from the next ``reset`` on.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], rate: Faults, seed: int | None = None) -> None:

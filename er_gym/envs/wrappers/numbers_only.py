@@ -1,4 +1,4 @@
-"""``info`` without words, for what takes numbers only."""
+"""A wrapper that leaves texts out of ``info``, for wrappers that accept numbers only."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from er_gym.envs.wrappers.base import TaskWrapper
 
 
 class NumbersOnly(TaskWrapper, RecordConstructorArgs):
-    """Leaves the words out of ``info``: feedback, names, reasons.
+    """Leaves the texts out of ``info``: feedback, names, reasons.
 
-    Gymnasium's ``NumpyToTorch`` and its like make no tensor of a text. Around one environment they
-    spoil the texts of ``info``; around a vector environment, which gathers texts in arrays of
-    objects, they fail. Words are still behind ``env.unwrapped``.
+    Gymnasium's ``NumpyToTorch`` and similar wrappers cannot make a tensor of a text. Around one
+    environment they garble the texts of ``info``. Around a vector environment, which gathers texts
+    in arrays of objects, they fail. The texts are still available from ``env.unwrapped``.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:

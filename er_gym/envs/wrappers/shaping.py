@@ -33,8 +33,8 @@ class KeyActionShaping(TaskWrapper, RecordConstructorArgs):
     gamma is the learner's own discount, and for truncated episodes if the learner bootstraps there.
 
     **For training only, never for evaluation.** The shaped reward reveals how many key actions are
-    left, which the agent is not told. Returns with and without shaping cannot be compared: a step
-    that ends an episode early gets back the whole remaining potential.
+    left, which the agent cannot observe. Returns with and without shaping cannot be compared: a
+    step that ends an episode early gets back the whole remaining potential.
     ``info["unshaped_reward"]`` keeps the environment's own reward of each step, 0 at ``reset``.
     Evaluate in an environment without this wrapper, or with ``scale=0``.
     """

@@ -32,7 +32,7 @@ class Begun:
 
 @dataclass(frozen=True)
 class Done:
-    """What came of a batch.
+    """The results of a batch of jobs.
 
     Attributes:
         results: of its jobs, in order.
@@ -53,18 +53,18 @@ def start_actor(kind: type, options: Mapping[str, Any], *args: Any) -> Any:
 
 
 class JobActor:
-    """Does jobs; what they are, :meth:`begin` is told."""
+    """Does jobs, with the function that :meth:`begin` makes."""
 
     def __init__(self) -> None:
         self._do: Callable[[Any], Any] | None = None
 
     def begin(self, driver: Origin, path: Sequence[str], make: bytes) -> Begun:
-        """Make what does the jobs.
+        """Make the function that does the jobs.
 
         Args:
             driver: the process that sends the jobs.
             path: where else to look for modules.
-            make: a pickled function that makes it.
+            make: a pickled function that returns it.
         """
         sys.path += [each for each in path if each not in sys.path]
         problem = _misfit(driver)
@@ -90,7 +90,7 @@ class JobActor:
         return Done(results, time.perf_counter() - start, resident_memory())
 
     def close(self) -> None:
-        """Close what did the jobs."""
+        """Close the function that did the jobs."""
         with contextlib.suppress(Exception):
             getattr(self._do, "close", lambda: None)()
 
@@ -115,7 +115,7 @@ class EnvActor:
 
 
 def resident_memory() -> int:
-    """The resident memory of this process, bytes; 0 where the system does not tell."""
+    """The resident memory of this process, bytes; 0 if the system does not report it."""
     try:
         with open("/proc/self/statm", encoding="ascii") as file:
             return int(file.read().split()[1]) * _PAGE_BYTES

@@ -1,10 +1,10 @@
-"""Does jobs by a crew of Ray actors, whatever becomes of the actors and their nodes.
+"""Does jobs in a group of Ray actors, also if actors and their nodes die.
 
 The driver holds all jobs and gives each actor a few at a time, so that neither a queue nor results
-pile up anywhere. An actor that is lost costs what it was at. If a node was lost with it, its jobs
-are done elsewhere, and that is all. If it died alone, the job may have killed it: each job that it
-was at is tried again by itself, and a job that kills three workers is given up, as
-:func:`er_gym.rollout.worker_pool.run_jobs` does.
+pile up anywhere. If an actor is lost, so are the results of its present jobs. If its node was lost,
+too, other actors do these jobs, and no job is blamed. If the actor died alone, a job may have
+killed it: each of its jobs is tried again alone, and a job whose worker dies three times is given
+up, as :func:`er_gym.rollout.worker_pool.run_jobs` does.
 """
 
 from __future__ import annotations
@@ -85,13 +85,13 @@ class _Member(Generic[Job]):
 
 @dataclass(frozen=True)
 class Terms:
-    """On what terms actors are hired.
+    """The resources and limits with which actors are started.
 
     Attributes:
         options: of ``ActorClass.options``.
         memory: a worker with more resident memory is replaced, bytes.
-        path: where else than on their own path they look for modules.
-        say: called with a message for the user while the cluster has no place.
+        path: folders that actors add to their ``sys.path``.
+        say: called with a message for the user while the cluster has no resources for an actor.
     """
 
     options: dict[str, Any]
@@ -287,7 +287,7 @@ def is_nodes_fault(error: RayError) -> bool:
 
 
 def first_line(error: BaseException) -> str:
-    """What Ray says of an error, in one line of a few words."""
+    """The reason that Ray gives for an error, in one short line."""
     if isinstance(error, RayTaskError):  # the job raised it
         return " ".join(f"{type(error.cause).__name__}: {error.cause}".split())[:300]
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
@@ -296,7 +296,7 @@ def first_line(error: BaseException) -> str:
 
 
 def no_place(wanted: int, options: dict[str, Any]) -> str:
-    """What to say while no worker has begun: has the cluster no place, or are they slow?"""
+    """The message while no worker has started: it says whether the cluster lacks resources."""
     free: dict[str, float] = ray.available_resources()  # type: ignore[no-untyped-call]
     cpus, memory = free.get("CPU", 0), free.get("memory", 0)
     asks = f"{options['num_cpus']:g} CPU and {options['memory'] / 2**30:.1f} GiB"

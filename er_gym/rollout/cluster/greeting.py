@@ -1,4 +1,4 @@
-"""Whether Ray is at an address, found out in seconds: Ray itself would wait for minutes."""
+"""Checks within seconds whether Ray answers at an address; Ray itself would wait for minutes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _KIND = 3
 
 
 def problem_at(host: str, port: int, patience: float = PATIENCE) -> str:
-    """Why Ray cannot be at an address, in words; empty if it can.
+    """Why no Ray server can be at an address, in words; empty if one may be.
 
     Args:
         host: a name or an IP address, IPv6 without brackets.

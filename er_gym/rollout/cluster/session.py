@@ -61,7 +61,7 @@ def ray_machines(
     """A cluster to work with.
 
     A Ray that is started here listens on loopback alone, and leaves no file behind. A process that
-    is a Ray driver already goes on using its cluster, and stays one.
+    is already connected to a cluster uses that one, and stays connected.
 
     Args:
         settings: which cluster, and what a worker is.
@@ -101,7 +101,7 @@ def ray_machines(
 
 @lru_cache
 def auth_token() -> str:
-    """The password of every Ray that this process starts: Ray reads it once in a process."""
+    """The password of all Ray clusters of this process: Ray reads it only once in a process."""
     return secrets.token_hex(32)
 
 
@@ -181,7 +181,7 @@ def _program(process: subprocess.Popen[bytes]) -> str:
 
 @contextlib.contextmanager
 def on_loopback() -> Iterator[None]:
-    """Let Ray take 127.0.0.1 for this machine's address also if it was imported before."""
+    """Let Ray use 127.0.0.1 as this machine's address, even if ``ray`` was imported before."""
     from ray._private import ray_constants
 
     before = ray_constants.ENABLE_RAY_CLUSTER

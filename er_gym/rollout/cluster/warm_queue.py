@@ -1,4 +1,4 @@
-"""A queue of jobs that gives a worker jobs of the room that it has warm."""
+"""A queue of jobs that gives a worker jobs of the room that it has already loaded."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ class WarmQueue(Generic[Job]):
 
     @property
     def has_first(self) -> bool:
-        """Whether the next job is one that was put first."""
+        """Whether the next job was added by :meth:`put_first`."""
         return bool(self._first)
 
     def put_first(self, job: Job) -> None:
-        """Add a job that the next worker is to have, whatever its room."""
+        """Add a job that the next worker gets, whatever its room."""
         self._first.append(job)
         self._length += 1
 
@@ -46,8 +46,8 @@ class WarmQueue(Generic[Job]):
 
         Args:
             most: from 1.
-            room: which the worker has warm; preferred.
-            others: rooms that other workers have warm; avoided while there are more rooms.
+            room: the room that the worker has loaded; preferred.
+            others: rooms that other workers have loaded; avoided while there are more rooms.
 
         Raises:
             IndexError: the queue is empty.

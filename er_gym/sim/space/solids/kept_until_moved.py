@@ -18,7 +18,7 @@ _SCENES_KEPT = 128
 def kept_until_moved(name: str) -> Callable[[OfObject[T]], OfObject[T]]:
     """Keep what a function of the world and an object's row returns until that object moves.
 
-    What holds where an object is recorded is kept for its scene, for all worlds.
+    Values for an object at its recorded place are kept for its scene, for all worlds.
 
     Args:
         name: describes the values in a debugger.
