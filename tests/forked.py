@@ -48,8 +48,9 @@ def fork_workers(modules: tuple[str, ...] = _MODULES) -> None:
 
 
 if __name__ == "__main__":
-    from benchmarks.cli.main import main
     from benchmarks.plan import run
+
+    from benchmarks.cli.main import main
 
     fork_workers(_MODULES_OF_PHASES)
     run.CONTEXT = FORKED  # type: ignore[assignment]

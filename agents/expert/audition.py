@@ -16,7 +16,7 @@ from typing import Any
 
 from agents.expert.acceptance import PlayedCourse, rejection
 from agents.expert.candidates import Candidate
-from agents.expert.corrections import beginning_of
+from agents.expert.corrections import first_mistake
 from agents.expert.course import Course, Intent, View
 from agents.expert.thought_kinds import ThoughtKinds
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -127,7 +127,7 @@ class _Auditions:
 
     def _verdict(self, candidate: Candidate) -> Verdict:
         if candidate.actor == "corrector" and candidate.beginning is None:
-            beginning = beginning_of(self._play(candidate))
+            beginning = first_mistake(self._play(candidate))
             if beginning.problem:
                 return Verdict(candidate, f"attempt: {beginning.problem}")
             candidate = replace(

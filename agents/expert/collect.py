@@ -15,7 +15,7 @@ from agents.expert.candidates import (
     CandidateSequence,
     FixedCandidates,
 )
-from agents.expert.corrections import CorrectAfter, CorrectBy, beginnings_of
+from agents.expert.corrections import CorrectAfter, CorrectBy, correction_points
 from agents.expert.explorer import Strength
 from agents.expert.players import Players, PlaySettings
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
@@ -210,7 +210,7 @@ def correction_strata(
     begun: set[tuple[str, tuple[Action, ...]]] = set()
     for episode in run_directory.episodes():
         task = by_id.get(episode.task_id)
-        for beginning in beginnings_of(episode, after):
+        for beginning in correction_points(episode, after):
             problem = beginning.problem if task else "its task is not among the suite's"
             if not problem and (episode.task_id, beginning.actions) in begun:
                 problem = "another sample of its task begins alike"

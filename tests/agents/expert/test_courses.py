@@ -11,7 +11,7 @@ import pytest
 from expert_courses import SEED, TASKS, Played, environment, of_each_type, play
 
 from agents.expert.candidates import Candidate, CandidateSequence
-from agents.expert.corrections import Beginning, beginning_of
+from agents.expert.corrections import Beginning, first_mistake
 from agents.expert.explorer import Strength
 from agents.expert.legs import legs_of
 from agents.expert.places import candidates, draw_places, plan_of
@@ -293,7 +293,7 @@ def test_a_correction_begins_like_the_failed_episode(env: EmbodiedEnv) -> None:
     corrected = 0
     for candidate in of_each_type(part, 4):
         failed = play(env, candidate)
-        beginning = beginning_of(failed.episode)
+        beginning = first_mistake(failed.episode)
         if beginning.problem:
             assert not beginning.actions
             continue
@@ -318,7 +318,7 @@ def test_a_correction_can_begin_after_a_failure(env: EmbodiedEnv) -> None:
     corrected = 0
     for candidate in of_each_type(part, 6):
         failed = play(env, candidate).episode
-        beginning = beginning_of(failed, "failure")
+        beginning = first_mistake(failed, "failure")
         if beginning.problem or failed.steps[1 + beginning.first_wrong].success:
             continue
         one = play(env, replace(candidate, beginning=beginning, strength=None))
@@ -335,7 +335,7 @@ def test_the_searcher_takes_over_a_failed_episode(env: EmbodiedEnv) -> None:
     corrected = 0
     for candidate in of_each_type(part, 4):
         failed = play(env, candidate)
-        beginning = beginning_of(failed.episode, "failure")
+        beginning = first_mistake(failed.episode, "failure")
         if beginning.problem:
             continue
         taken_over = replace(candidate, beginning=beginning, strength=None, correct_by="searcher")
