@@ -8,7 +8,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from agents.expert.audition import audition
 from agents.expert.candidates import (
     Candidate,
     Candidates,
@@ -18,6 +17,7 @@ from agents.expert.candidates import (
 from agents.expert.corrections import CorrectAfter, CorrectBy, correction_points
 from agents.expert.explorer import Strength
 from agents.expert.players import Players, PlaySettings
+from agents.expert.prescreen import prescreen
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
 from er_gym.data.collection import Collection, CollectionError
 from er_gym.data.trajectory import Trajectory
@@ -358,10 +358,10 @@ class Collector:
             self._choose(strata, env, most)
 
     def _choose(self, strata: Sequence[Stratum], env: Mapping[str, Any], most: int) -> None:
-        """Look at more candidates, and choose those that an audition shows to be fit."""
+        """Look at more candidates, and choose those that a prescreening shows to be fit."""
         rounds = [(stratum, stratum.next()) for stratum in strata if stratum.open]
         fit: dict[str, Candidate] = {}
-        for verdict in audition(
+        for verdict in prescreen(
             [each for _, candidates in rounds for each in candidates],
             env=env,
             seed=self._settings.seed,

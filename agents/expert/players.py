@@ -49,8 +49,8 @@ class Players(Protocol):
 
     @property
     def scripted(self) -> bool:
-        """Whether the agents do what the candidates' courses decide, so that an audition shows how
-        their episodes come out."""
+        """Whether the agents do what the candidates' courses decide, so that a prescreening shows
+        how their episodes come out."""
 
     def make(
         self, candidates: Mapping[str, Candidate], settings: PlaySettings, most_actions: int

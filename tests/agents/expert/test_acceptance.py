@@ -145,9 +145,8 @@ def test_somebody_can_take_over_anywhere() -> None:
     for number in range(20):  # and the last one at which the fourth of a row could be avoided
         row = [*walk, *["!open Fridge", "pickup Egg"] * 4, *["navigate to Bed"] * 4]
         stuck = failed(*row, max_steps=60, end_reason="repeated action", task_id=f"task-{number}")
-        assert [len(each.actions) for each in correction_points(stuck, "anywhere")][-1] == len(
-            row
-        ) - 1
+        last = correction_points(stuck, "anywhere")[-1]
+        assert len(last.actions) == len(row) - 1
     for episode, problem in (
         (failed("error", "navigate to Sink"), "no action leaves room"),
         (failed("navigate to Sink", max_steps=10), "no action leaves room"),

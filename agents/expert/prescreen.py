@@ -1,8 +1,8 @@
-"""Auditions: candidates are played without pictures and thoughts, to see which will be taken.
+"""Prescreening: candidates are played without pictures and thoughts, to see which will be taken.
 
 Two thirds of the candidates are not taken: their object was in view from the beginning, nothing
-went wrong, the explorer did not find it. An audition costs a tenth of an episode with pictures. An
-episode comes out the same as its audition, since both have the same seed.
+went wrong, the explorer did not find it. A prescreening costs a tenth of an episode with pictures.
+An episode comes out the same as its prescreening, since both have the same seed.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _MOST_AT_ONCE = 60
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came of an audition.
+    """What came of a prescreening.
 
     Attributes:
         candidate: the candidate; a correction has the beginning that it corrects now.
@@ -46,7 +46,7 @@ class Verdict:
     reason: str = ""
 
 
-def audition(
+def prescreen(
     candidates: Sequence[Candidate],
     *,
     env: Mapping[str, Any],
@@ -70,12 +70,12 @@ def audition(
     Raises:
         WorkerSetupError: the environment cannot be made.
     """
-    make = partial(_Auditions, dict(env), seed, kinds, most_actions)
+    make = partial(_Prescreener, dict(env), seed, kinds, most_actions)
     jobs = [*_jobs(candidates)]
     with closing(machines.run_jobs(make, jobs, workers=workers, room=_room)) as results:
         for job, result in results:
             if isinstance(result, LostJob):
-                yield from (Verdict(each, "its audition crashed") for each in job)
+                yield from (Verdict(each, "its prescreening crashed") for each in job)
             else:
                 yield from result
 
@@ -113,7 +113,7 @@ class SilentAgent:
         return Decision(next(self._intents).action)
 
 
-class _Auditions:
+class _Prescreener:
     """Plays the candidates of a job in one environment."""
 
     def __init__(
