@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from agents.finetune.train import Result
 
 PRINTABLE = ("llama-factory", "ms-swift", "trl", "deepspeed")
-"""As in ``agents.finetune.printing``, which is too slow to import for ``--help``; a test
+"""As in ``agents.finetune.launchers``, which is too slow to import for ``--help``; a test
 compares."""
 
 
@@ -129,7 +129,7 @@ def _print_run(program: str, settings: FinetuneSettings, options: FinetuneOption
     from er_gym.activity import begin_import
 
     begin_import("PyTorch and transformers", "torch", "transformers")
-    from agents.finetune.printing import write_files
+    from agents.finetune.launchers import write_files
 
     data, *more = options.data
     if more:

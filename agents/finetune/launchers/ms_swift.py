@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from agents.finetune.printing.plan import (
+from agents.finetune.launchers.plan import (
     DATA,
     Printed,
     PrintPlan,
@@ -15,7 +15,7 @@ from agents.finetune.printing.plan import (
     yaml_text,
     zero3_text,
 )
-from agents.finetune.printing.sources import SourceJob
+from agents.finetune.launchers.sources import SourceJob
 from er_gym.data.exports.ms_swift import MS_SWIFT as EXPORT
 from er_gym.data.exports.sharegpt import FEEDBACK_TOKEN
 

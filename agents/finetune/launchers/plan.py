@@ -10,8 +10,8 @@ from typing import Any
 
 import yaml
 
+from agents.finetune.launchers.sources import Facts, Source
 from agents.finetune.models import ChosenModel
-from agents.finetune.printing.sources import Facts, Source
 from agents.finetune.settings import FinetuneSettings
 
 DATA, OUTPUT = "data", "output"

@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 
 from agents import configs
-from agents.finetune.printing.plan import (
+from agents.finetune.launchers.plan import (
     DATA,
     OUTPUT,
     ZERO3_FILE,
@@ -18,7 +18,7 @@ from agents.finetune.printing.plan import (
     Program,
     zero3,
 )
-from agents.finetune.printing.sources import SourceJob
+from agents.finetune.launchers.sources import SourceJob
 from er_gym.data.collection import MANIFEST
 from er_gym.data.exports.ms_swift import MS_SWIFT as EXPORT
 from er_gym.writing import place_file

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from agents.finetune.launchers.plan import PrintPlan
 from agents.finetune.memory import GIB, Memory, ModelNumbers, Plan, memory
 from agents.finetune.models import load_facts, model_names
-from agents.finetune.printing.plan import PrintPlan
 from agents.finetune.settings import FinetuneSettings, Lora
 from er_gym.tables import Table
 

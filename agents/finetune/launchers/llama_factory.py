@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from agents.finetune.printing.plan import (
+from agents.finetune.launchers.plan import (
     DATA,
     OUTPUT,
     Printed,
@@ -20,7 +20,7 @@ from agents.finetune.printing.plan import (
     yaml_text,
     zero3_text,
 )
-from agents.finetune.printing.sources import SourceJob
+from agents.finetune.launchers.sources import SourceJob
 from er_gym.data.exports.sharegpt import SHAREGPT
 
 NAME = "llama-factory"

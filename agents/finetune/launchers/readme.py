@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import shlex
 
-from agents.finetune.printing.expected import models_table, run_table
-from agents.finetune.printing.plan import DATA, Printed, PrintPlan
+from agents.finetune.launchers.expected import models_table, run_table
+from agents.finetune.launchers.plan import DATA, Printed, PrintPlan
 from er_gym.writing import MARKDOWN_MARK
 
 SCRIPT = "train.sh"

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from agents.finetune.launchers.deepspeed import DEEPSPEED
+from agents.finetune.launchers.llama_factory import LLAMA_FACTORY
+from agents.finetune.launchers.ms_swift import MS_SWIFT
+from agents.finetune.launchers.plan import DATA, PrintPlan, Program
+from agents.finetune.launchers.readme import SCRIPT, readme, script
+from agents.finetune.launchers.sources import Facts, PicturesToTokens, look_at, open_source
+from agents.finetune.launchers.trl import TRL
 from agents.finetune.models import ChosenModel, choose_model, picture_tokens
-from agents.finetune.printing.deepspeed import DEEPSPEED
-from agents.finetune.printing.llama_factory import LLAMA_FACTORY
-from agents.finetune.printing.ms_swift import MS_SWIFT
-from agents.finetune.printing.plan import DATA, PrintPlan, Program
-from agents.finetune.printing.readme import SCRIPT, readme, script
-from agents.finetune.printing.sources import Facts, PicturesToTokens, look_at, open_source
-from agents.finetune.printing.trl import TRL
 from agents.finetune.settings import FinetuneSettings
 from er_gym.data.trajectory import PictureRecord
 from er_gym.writing import check_folder, whole_folder, write_atomic
