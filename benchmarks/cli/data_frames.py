@@ -49,7 +49,7 @@ def frames(
 
     They are taken from poses that agents take, in the suite's arrangements, with some things opened
     or switched on. er-gym finetune learns from them. It refuses rooms that are kept for evaluation:
-    frames of these are for measuring, by python -m benchmarks.eyes.
+    frames of these are for measuring, by python -m benchmarks.vision_probe.
     """
     from er_gym.data.frame_camera import DrawingError, draw_frames, visits
     from er_gym.data.frames import FRAMES, FrameSet
