@@ -165,9 +165,9 @@ def readers() -> Mapping[str, Reader]:
     from agents.vlm.shortcomings import causes_of
     from benchmarks.monitor.formats import brief, visible
     from er_gym.data.critic import LONGEST_WORD, check
-    from er_gym.data.heard import language_of, thoughts_of, user_message
     from er_gym.data.knowledge import Knowledge
     from er_gym.data.mentions import find_mentions, named_in
+    from er_gym.data.parse_conversation import language_of, thoughts_of, user_message
     from er_gym.data.sharegpt_report import decision
     from er_gym.data.trajectory import Subgoal
     from er_gym.data.words import count_words, sentences

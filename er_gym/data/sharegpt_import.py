@@ -21,7 +21,7 @@ from er_gym.data.album import Album, Outside, picture_name
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import Collection, CollectionManifest
 from er_gym.data.exports.paper_reader import PURPOSE
-from er_gym.data.heard import UserMessage, language_of, thoughts_of, user_message
+from er_gym.data.parse_conversation import UserMessage, language_of, thoughts_of, user_message
 from er_gym.data.sharegpt_files import ShareGptFile
 from er_gym.data.sharegpt_report import decision
 from er_gym.data.trajectory import Language, PictureRecord, Trajectory, Turn
