@@ -36,7 +36,7 @@ PARTS: Mapping[str, frozenset[str]] = {
 # -- what is seen, and where it is -----------------------------------------------------------------
 
 
-def unseen(thought: Thought) -> Iterator[Refusal]:
+def check_unseen(thought: Thought) -> Iterator[Refusal]:
     """Claims to see what is not and was not in view, or says where it is."""
     phrases = thought.phrases
     for clause in thought.clauses:
@@ -58,7 +58,7 @@ def unseen(thought: Thought) -> Iterator[Refusal]:
                         yield _not_seen(mention)
 
 
-def hidden(thought: Thought) -> Iterator[Refusal]:
+def check_hidden(thought: Thought) -> Iterator[Refusal]:
     """Says as a fact where something is that was never in view, or what a container holds that was
     never opened."""
     phrases = thought.phrases
@@ -87,7 +87,7 @@ def hidden(thought: Thought) -> Iterator[Refusal]:
                 )
 
 
-def inside(thought: Thought) -> Iterator[Refusal]:
+def check_inside(thought: Thought) -> Iterator[Refusal]:
     """Tells what is in a container that is shut and that the agent has not opened."""
     for mention, holder in _told_to_be_on(thought):
         if not _is_shut(thought, holder) or not mention.types & thought.seen:
@@ -100,7 +100,7 @@ def inside(thought: Thought) -> Iterator[Refusal]:
             )
 
 
-def support(thought: Thought) -> Iterator[Refusal]:
+def check_support(thought: Thought) -> Iterator[Refusal]:
     """Says that something in view lies in or on another thing than it does."""
     for mention, holder in _told_to_be_on(thought):
         wrong = _not_on(thought, mention, holder)
@@ -123,7 +123,7 @@ def _told_to_be_on(thought: Thought) -> Iterator[tuple[Mention, Mention]]:
                     yield mention, holder
 
 
-def side(thought: Thought) -> Iterator[Refusal]:
+def check_side(thought: Thought) -> Iterator[Refusal]:
     """Says that something in view is on a side where it is not."""
     for clause in thought.clauses:
         if not clause.mentions or clause.guessed or clause.negated or clause.past:
@@ -158,7 +158,7 @@ def _bears_there(thought: Thought, mention: Mention, clause: Clause, direction: 
     )
 
 
-def denied(thought: Thought) -> Iterator[Refusal]:
+def check_denied(thought: Thought) -> Iterator[Refusal]:
     """Claims not to see what is in view."""
     for clause, match in _denials(thought, thought.phrases.denied):
         for mention in clause.named(match, "xs"):
@@ -166,7 +166,7 @@ def denied(thought: Thought) -> Iterator[Refusal]:
                 yield Refusal("unseen", f"{name_of(mention)} is in view; do not say it is not.")
 
 
-def count(thought: Thought) -> Iterator[Refusal]:
+def check_count(thought: Thought) -> Iterator[Refusal]:
     """Claims that there are more of something in view than there are."""
     for clause in thought.clauses:
         if not clause.is_fact or clause.past or clause.wanted:
@@ -181,7 +181,7 @@ def count(thought: Thought) -> Iterator[Refusal]:
 # -- states and the hand ---------------------------------------------------------------------------
 
 
-def state(thought: Thought) -> Iterator[Refusal]:
+def check_state(thought: Thought) -> Iterator[Refusal]:
     """Says that something in view is open, closed, on or off, and it is not."""
     phrases = thought.phrases
     for clause in thought.clauses:
@@ -201,7 +201,7 @@ def state(thought: Thought) -> Iterator[Refusal]:
                 yield Refusal("state", f"{name_of(mention)} {wrong}; say so, or leave it out.")
 
 
-def hand(thought: Thought) -> Iterator[Refusal]:
+def check_hand(thought: Thought) -> Iterator[Refusal]:
     """Says that it holds what it does not, or that its hand is empty when it is not."""
     phrases, held = thought.phrases, thought.known.held
     truth = f"the agent holds {held}" if held else "the hand is empty"

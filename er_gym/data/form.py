@@ -40,7 +40,7 @@ def _lonely(text: str) -> int:
     return sum(1 for each in _HAN.sub(" ", text).split() if not re.search(r"\w", each))
 
 
-def length(thought: Thought) -> Iterator[Refusal]:
+def check_length(thought: Thought) -> Iterator[Refusal]:
     """Empty, shorter than three words, or over the limit."""
     count = words(thought.text)
     if not thought.text.strip():
@@ -51,7 +51,7 @@ def length(thought: Thought) -> Iterator[Refusal]:
         yield Refusal("length", f"The thought has {count} words; write at most {thought.limit}.")
 
 
-def language(thought: Thought) -> Iterator[Refusal]:
+def check_language(thought: Thought) -> Iterator[Refusal]:
     """Another language than it is to be written in, or two mixed."""
     text = thought.text
     other = _OTHER_SCRIPTS.search(text)
@@ -69,7 +69,7 @@ def language(thought: Thought) -> Iterator[Refusal]:
         yield Refusal("language", "Write in English only.")
 
 
-def tags(thought: Thought) -> Iterator[Refusal]:
+def check_tags(thought: Thought) -> Iterator[Refusal]:
     """Marks that are no part of a thought: tags, names of speakers or of kinds, headings."""
     found = (
         _MARKUP.search(thought.text)
@@ -84,7 +84,7 @@ def tags(thought: Thought) -> Iterator[Refusal]:
         )
 
 
-def leak(thought: Thought) -> Iterator[Refusal]:
+def check_leak(thought: Thought) -> Iterator[Refusal]:
     """Speaks of the prompt, of the data or of itself as a model, or is an error's text."""
     found = thought.phrases.leak.search(thought.text.lower().replace("’", "'"))
     if found:
@@ -95,7 +95,7 @@ def leak(thought: Thought) -> Iterator[Refusal]:
         )
 
 
-def repeat(thought: Thought) -> Iterator[Refusal]:
+def check_repeat(thought: Thought) -> Iterator[Refusal]:
     """The text of an earlier thought of the episode."""
     plain = _PLAIN.sub("", thought.text).casefold()
     for turn in thought.known.earlier:

@@ -30,7 +30,7 @@ _RECENT = 3
 # -- what was done ---------------------------------------------------------------------------------
 
 
-def history(thought: Thought) -> Iterator[Refusal]:
+def check_history(thought: Thought) -> Iterator[Refusal]:
     """Claims to have done what was not done."""
     for clause in thought.clauses:
         if clause.asks or clause.conditional or clause.hedged or not clause.mentions:
@@ -71,7 +71,7 @@ def _has_done(thought: Thought, verb: str, mention: Mention) -> bool:
     return not opens and any(place for each in types for place in (known.seen.get(each),))
 
 
-def outcome(thought: Thought) -> Iterator[Refusal]:
+def check_outcome(thought: Thought) -> Iterator[Refusal]:
     """Claims that the last action succeeded when it failed, or the other way round."""
     actions = thought.known.actions
     last = thought.known.last
@@ -122,7 +122,7 @@ class Decided:
     later: bool
 
 
-def decision(thought: Thought) -> Iterator[Refusal]:
+def check_decision(thought: Thought) -> Iterator[Refusal]:
     """Decides on another action than the one that is taken."""
     known, phrases = thought.known, thought.phrases
     decided = [each for each in _decided(thought) if each.act != "look around" or each.clause.last]
