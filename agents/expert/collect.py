@@ -368,7 +368,7 @@ class Collector:
             kinds=self._settings.play.kinds,
             most_actions=most,
             workers=self._parallelism.workers,
-            machines=self._parallelism.machines,
+            worker_backend=self._parallelism.worker_backend,
         ):
             if verdict.reason:
                 self._reject(verdict.reason)

@@ -21,9 +21,9 @@ from agents.expert.course import Course, Intent, View
 from agents.expert.thought_kinds import ThoughtKinds
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.agent import Decision
-from er_gym.rollout.machines import THIS_MACHINE, Machines
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.records import EpisodeRecord
+from er_gym.rollout.worker_backend import LOCAL_BACKEND, WorkerBackend
 from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.task import Task
 
@@ -54,7 +54,7 @@ def prescreen(
     kinds: ThoughtKinds,
     most_actions: int,
     workers: int,
-    machines: Machines = THIS_MACHINE,
+    worker_backend: WorkerBackend = LOCAL_BACKEND,
 ) -> Iterator[Verdict]:
     """Play candidates silently in worker processes; yields the verdicts as they come.
 
@@ -65,14 +65,14 @@ def prescreen(
         kinds: draws how tasks end.
         most_actions: longer trajectories are not taken.
         workers: the number of processes.
-        machines: where they run.
+        worker_backend: where they run.
 
     Raises:
         WorkerSetupError: the environment cannot be made.
     """
     make = partial(_Prescreener, dict(env), seed, kinds, most_actions)
     jobs = [*_jobs(candidates)]
-    with closing(machines.run_jobs(make, jobs, workers=workers, room=_room)) as results:
+    with closing(worker_backend.run_jobs(make, jobs, workers=workers, room=_room)) as results:
         for job, result in results:
             if isinstance(result, LostJob):
                 yield from (Verdict(each, "its prescreening crashed") for each in job)

@@ -261,7 +261,7 @@ def _prepared_run(
     if vlm_run is None:
         named_agent = NamedAgent(agent)
         with bad_input():
-            shared = workforce.machines.shares_files
+            shared = workforce.worker_backend.shares_files
             make = named_agent if shared else named_agent.carried()
         yield (
             lambda shown, more: run(

@@ -61,7 +61,7 @@ def verify(suites: tuple[str, ...], executor_options: ExecutorOptions) -> int:
             executor_options.workforce(progress.say, processors()) as workforce,
             progress,
             closing(
-                workforce.machines.run_jobs(
+                workforce.worker_backend.run_jobs(
                     make_verifier, todo, workers=workforce.workers, room=attrgetter("scene")
                 )
             ) as results,

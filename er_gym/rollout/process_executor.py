@@ -33,17 +33,17 @@ def play_in_processes(assigned: Assignment) -> None:
     """Play each task in one of ``parallelism.workers`` processes. See :class:`.Executor`."""
     make_agent, directory = assigned.make_agent, assigned.directory
     settings, parallelism = assigned.episodes, assigned.parallelism
-    machines = parallelism.machines
+    worker_backend = parallelism.worker_backend
     _check_picklable(make_agent)
     worker = partial(
         EpisodeWorker,
         make_agent,
         settings,
         directory.path.absolute(),
-        appends_events=machines.is_here,
-        writes_files=machines.shares_files and not machines.is_here,
+        appends_events=worker_backend.is_local,
+        writes_files=worker_backend.shares_files and not worker_backend.is_local,
     )
-    results = machines.run_jobs(
+    results = worker_backend.run_jobs(
         worker, assigned.tasks, workers=parallelism.workers, room=attrgetter("scene")
     )
     with closing(results), closing(EventLog(directory.path)) as events:

@@ -48,7 +48,7 @@ def play_in_threads(assigned: Assignment) -> None:
             slots,
             env,
             deadline=parallelism.deadline,
-            machines=parallelism.machines,
+            worker_backend=parallelism.worker_backend,
         ) as pool,
         closing(EventLog(directory.path)) as events,
     ):

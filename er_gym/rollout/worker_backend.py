@@ -1,7 +1,8 @@
 """Where worker processes run: on this machine, or on a cluster.
 
-Everything that needs worker processes asks a :class:`Machines` for them. :data:`THIS_MACHINE` has
-processes of its own; :class:`er_gym.rollout.cluster.machines.RayMachines` has Ray's.
+Everything that needs worker processes asks a :class:`WorkerBackend` for them.
+:data:`LOCAL_BACKEND` has processes of its own;
+:class:`er_gym.rollout.cluster.worker_backend.RayBackend` has Ray's.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 
-class Machines(Protocol):
+class WorkerBackend(Protocol):
     """Where worker processes run; hashable and cheap to hold."""
 
     @property
-    def is_here(self) -> bool:
+    def is_local(self) -> bool:
         """Whether all workers are on this machine, so that they may append to a file at once."""
 
     @property
@@ -54,10 +55,10 @@ class Machines(Protocol):
 
 
 @dataclass(frozen=True)
-class _ThisMachine:
-    """Spawned processes of this machine; see :class:`Machines`."""
+class _LocalBackend:
+    """Spawned processes of this machine; see :class:`WorkerBackend`."""
 
-    is_here = True
+    is_local = True
     shares_files = True
 
     def run_jobs(
@@ -76,4 +77,4 @@ class _ThisMachine:
         return LocalEnvWorker(slots, env)
 
 
-THIS_MACHINE: Machines = _ThisMachine()
+LOCAL_BACKEND: WorkerBackend = _LocalBackend()

@@ -1,4 +1,4 @@
-"""Does jobs by a crew of Ray actors, whatever becomes of the actors and their nodes.
+"""Does jobs by a pool of Ray actors, whatever becomes of the actors and their nodes.
 
 The driver holds all jobs and gives each actor a few at a time, so that neither a queue nor results
 pile up anywhere. An actor that is lost costs what it was at. If a node was lost with it, its jobs
@@ -84,27 +84,27 @@ class _Member(Generic[Job]):
 
 
 @dataclass(frozen=True)
-class Terms:
-    """On what terms actors are hired.
+class ActorOptions:
+    """What actors are started with.
 
     Attributes:
-        options: of ``ActorClass.options``.
+        ray_options: of ``ActorClass.options``.
         memory: a worker with more resident memory is replaced, bytes.
         path: where else than on their own path they look for modules.
         say: called with a message for the user while the cluster has no place.
     """
 
-    options: dict[str, Any]
+    ray_options: dict[str, Any]
     memory: int
     path: Sequence[str]
     say: Callable[[str], None]
 
 
-class Crew(Generic[Job, Result]):
+class ActorPool(Generic[Job, Result]):
     """Does jobs; see the module.
 
     Args:
-        terms: of its actors.
+        options: of its actors.
         make: as :func:`er_gym.rollout.worker_pool.run_jobs` takes it.
         jobs: as there.
         workers: the largest number of actors.
@@ -114,7 +114,7 @@ class Crew(Generic[Job, Result]):
 
     def __init__(
         self,
-        terms: Terms,
+        options: ActorOptions,
         make: Callable[[], Callable[[Job], Result]],
         jobs: Iterable[Job],
         *,
@@ -122,7 +122,7 @@ class Crew(Generic[Job, Result]):
         tries: int,
         room: Callable[[Job], Hashable],
     ) -> None:
-        self._terms, self._workers, self._tries = terms, workers, tries
+        self._options, self._workers, self._tries = options, workers, tries
         pickled: bytes = cloudpickle.dumps(make)  # type: ignore[no-untyped-call]
         self._make = ray.put(pickled)
         self._queue = WarmQueue((_Try(job) for job in jobs), lambda attempt: room(attempt.job))
@@ -130,13 +130,13 @@ class Crew(Generic[Job, Result]):
         self._job_seconds = 0.0
         self._deaths = 0
         self._told_of_memory = False
-        self._hire_after = self._told = time.monotonic()
+        self._start_after = self._told = time.monotonic()
 
     def results(self) -> Generator[tuple[Job, Result | LostJob], None, None]:
         """Each job with its result, as :func:`er_gym.rollout.worker_pool.run_jobs` yields them."""
         try:
             while self._queue or any(member.batches for member in self._members):
-                self._hire()
+                self._start_actors()
                 for member in self._members:
                     self._give(member)
                 yield from self._news()
@@ -146,13 +146,13 @@ class Crew(Generic[Job, Result]):
 
     # -- actors ----------------------------------------------------------------------------------
 
-    def _hire(self) -> None:
+    def _start_actors(self) -> None:
         """Start actors, as many as there are jobs for."""
         at_work = sum(len(batch) for member in self._members for _, batch in member.batches)
         wanted = min(self._workers, len(self._queue) + at_work)
-        while len(self._members) < wanted and time.monotonic() >= self._hire_after:
-            actor = start_actor(JobActor, self._terms.options)
-            beginning = actor.begin.remote(Origin.here(), self._terms.path, self._make)
+        while len(self._members) < wanted and time.monotonic() >= self._start_after:
+            actor = start_actor(JobActor, self._options.ray_options)
+            beginning = actor.begin.remote(Origin.here(), self._options.path, self._make)
             self._members.append(_Member(actor, beginning))
 
     def _dismiss(self, member: _Member[Job]) -> None:
@@ -193,8 +193,8 @@ class Crew(Generic[Job, Result]):
     def _news(self) -> Generator[tuple[Job, Result | LostJob], None, None]:
         """Wait for the next answers and handle them."""
         asked = {member.next_ref: member for member in self._members if member.next_ref}
-        if not asked:  # all died; wait until others may be hired
-            time.sleep(max(0.0, self._hire_after - time.monotonic()))
+        if not asked:  # all died; wait until others may be started
+            time.sleep(max(0.0, self._start_after - time.monotonic()))
             return
         ready, rest = ray.wait([*asked], timeout=_LOOK_SECONDS)
         if rest and ready:
@@ -221,7 +221,7 @@ class Crew(Generic[Job, Result]):
         each = done.seconds / len(batch)
         self._job_seconds = each if not self._job_seconds else 0.8 * self._job_seconds + 0.2 * each
         self._deaths = 0
-        if done.memory > self._terms.memory:
+        if done.memory > self._options.memory:
             member.retiring = True
             self._tell_of_memory(done.memory)
         if member.retiring and not member.batches:
@@ -253,7 +253,7 @@ class Crew(Generic[Job, Result]):
                     self._queue.put_first(attempt)
 
     def _wait_after_death(self, error: RayError) -> None:
-        """Hire again at once after one death, later and later after several in a row."""
+        """Start actors again at once after one death, later and later after several in a row."""
         self._deaths += 1
         if self._deaths > _MOST_DEATHS:
             raise WorkerSetupError(
@@ -261,16 +261,16 @@ class Crew(Generic[Job, Result]):
             )
         if self._deaths > len(self._members) + 1:
             wait = min(_LONGEST_WAIT, _FIRST_WAIT * 2 ** (self._deaths - 2))
-            self._hire_after = time.monotonic() + wait
+            self._start_after = time.monotonic() + wait
 
     def _tell_of_memory(self, memory: int) -> None:
         """Say once that workers grow larger than they are allowed to."""
         if not self._told_of_memory:
             self._told_of_memory = True
-            self._terms.say(
+            self._options.say(
                 f"a worker takes {memory / 2**30:.1f} GiB, more than the "
-                f"{self._terms.memory / 2**30:.1f} GiB that it has asked for, and is replaced; if "
-                "that happens often, give a larger --worker-memory"
+                f"{self._options.memory / 2**30:.1f} GiB that it has asked for, and is replaced; "
+                "if that happens often, give a larger --worker-memory"
             )
 
     def _tell_if_waiting(self) -> None:
@@ -278,7 +278,7 @@ class Crew(Generic[Job, Result]):
         waiting = self._members and all(member.beginning for member in self._members)
         if waiting and time.monotonic() - self._told > _TELL_SECONDS:
             self._told = time.monotonic()
-            self._terms.say(no_place(len(self._members), self._terms.options))
+            self._options.say(waiting_message(len(self._members), self._options.ray_options))
 
 
 def is_nodes_fault(error: RayError) -> bool:
@@ -295,7 +295,7 @@ def first_line(error: BaseException) -> str:
     return why.partition(". ")[0].rstrip(".")
 
 
-def no_place(wanted: int, options: dict[str, Any]) -> str:
+def waiting_message(wanted: int, options: dict[str, Any]) -> str:
     """What to say while no worker has begun: has the cluster no place, or are they slow?"""
     free: dict[str, float] = ray.available_resources()  # type: ignore[no-untyped-call]
     cpus, memory = free.get("CPU", 0), free.get("memory", 0)
