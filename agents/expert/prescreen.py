@@ -72,7 +72,9 @@ def prescreen(
     """
     make = partial(_Prescreener, dict(env), seed, kinds, most_actions)
     jobs = [*_jobs(candidates)]
-    with closing(worker_backend.run_jobs(make, jobs, workers=workers, room=_room)) as results:
+    with closing(
+        worker_backend.run_jobs(make, jobs, workers=workers, affinity_key=_room)
+    ) as results:
         for job, result in results:
             if isinstance(result, LostJob):
                 yield from (Verdict(each, "its prescreening crashed") for each in job)

@@ -62,7 +62,7 @@ def verify(suites: tuple[str, ...], executor_options: ExecutorOptions) -> int:
             progress,
             closing(
                 workforce.worker_backend.run_jobs(
-                    make_verifier, todo, workers=workforce.workers, room=attrgetter("scene")
+                    make_verifier, todo, workers=workforce.workers, affinity_key=attrgetter("scene")
                 )
             ) as results,
         ):

@@ -109,7 +109,9 @@ def verify(
     collection.parts()  # a damaged part is told before anything is played
     batches = _batches(lines, tasks)
     make = partial(_Worker, collection.path.absolute(), pictures)
-    with closing(worker_backend.run_jobs(make, batches, workers=workers, room=_room)) as results:
+    with closing(
+        worker_backend.run_jobs(make, batches, workers=workers, affinity_key=_room)
+    ) as results:
         for batch, verdicts in results:
             if isinstance(verdicts, LostJob):
                 yield from (Verdict(line.id, (str(verdicts),)) for line in batch.lines)

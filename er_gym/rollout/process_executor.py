@@ -44,7 +44,7 @@ def play_in_processes(assigned: Assignment) -> None:
         writes_files=worker_backend.shares_files and not worker_backend.is_local,
     )
     results = worker_backend.run_jobs(
-        worker, assigned.tasks, workers=parallelism.workers, room=attrgetter("scene")
+        worker, assigned.tasks, workers=parallelism.workers, affinity_key=attrgetter("scene")
     )
     with closing(results), closing(EventLog(directory.path)) as events:
         for task, result in results:

@@ -36,7 +36,7 @@ class WorkerBackend(Protocol):
         *,
         workers: int,
         tries: int = 3,
-        room: Callable[[Job], Hashable] | None = None,
+        affinity_key: Callable[[Job], Hashable] | None = None,
     ) -> Generator[tuple[Job, Result | LostJob], None, None]:
         """Do every job in a worker process; see :func:`.worker_pool.run_jobs`.
 
@@ -45,8 +45,8 @@ class WorkerBackend(Protocol):
             jobs: as there.
             workers: as there.
             tries: as there.
-            room: what a worker has warm once it has done a job; jobs of one room go to one worker
-                where that costs no time.
+            affinity_key: of a job: what a worker has warm once it has done it, such as a room; jobs
+                with the same key go to one worker where that costs no time.
         """
 
     def start_env_worker(self, slots: Sequence[int], env: Mapping[str, Any]) -> EnvWorker:
@@ -68,9 +68,9 @@ class _LocalBackend:
         *,
         workers: int,
         tries: int = 3,
-        room: Callable[[Job], Hashable] | None = None,
+        affinity_key: Callable[[Job], Hashable] | None = None,
     ) -> Generator[tuple[Job, Result | LostJob], None, None]:
-        """All rooms fit into the memory of each process, so ``room`` changes nothing."""
+        """All rooms fit into the memory of each process, so ``affinity_key`` changes nothing."""
         return run_jobs(make, jobs, workers=workers, tries=tries)
 
     def start_env_worker(self, slots: Sequence[int], env: Mapping[str, Any]) -> EnvWorker:

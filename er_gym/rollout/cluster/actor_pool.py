@@ -67,14 +67,14 @@ class _Member(Generic[Job]):
     Attributes:
         beginning: until it is ready, the reference of :class:`.Begun`.
         batches: what it has been given, in order: the reference of :class:`.Done`, and the jobs.
-        room: of its last job.
+        affinity: the affinity key of its last job.
         retiring: whether it gets no more.
     """
 
     actor: Any
     beginning: Any
     batches: deque[tuple[Any, list[_Try[Job]]]] = field(default_factory=deque)
-    room: Hashable = None
+    affinity: Hashable = None
     retiring: bool = False
 
     @property
@@ -109,7 +109,7 @@ class ActorPool(Generic[Job, Result]):
         jobs: as there.
         workers: the largest number of actors.
         tries: as there.
-        room: of a job.
+        affinity_key: of a job, as there.
     """
 
     def __init__(
@@ -120,12 +120,14 @@ class ActorPool(Generic[Job, Result]):
         *,
         workers: int,
         tries: int,
-        room: Callable[[Job], Hashable],
+        affinity_key: Callable[[Job], Hashable],
     ) -> None:
         self._options, self._workers, self._tries = options, workers, tries
         pickled: bytes = cloudpickle.dumps(make)  # type: ignore[no-untyped-call]
         self._make = ray.put(pickled)
-        self._queue = WarmQueue((_Try(job) for job in jobs), lambda attempt: room(attempt.job))
+        self._queue = WarmQueue(
+            (_Try(job) for job in jobs), lambda attempt: affinity_key(attempt.job)
+        )
         self._members: list[_Member[Job]] = []
         self._job_seconds = 0.0
         self._deaths = 0
@@ -166,8 +168,8 @@ class ActorPool(Generic[Job, Result]):
             and not member.retiring
             and len(member.batches) < self._depth(member)
         ):
-            others = [one.room for one in self._members if one is not member]
-            member.room, batch = self._queue.take(self._batch_size(), member.room, others)
+            others = [one.affinity for one in self._members if one is not member]
+            member.affinity, batch = self._queue.take(self._batch_size(), member.affinity, others)
             jobs = pickle.dumps([attempt.job for attempt in batch])
             member.batches.append((member.actor.do.remote(jobs), batch))
 

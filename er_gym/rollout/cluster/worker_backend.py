@@ -54,12 +54,14 @@ class RayBackend:
         *,
         workers: int,
         tries: int = 3,
-        room: Callable[[Job], Hashable] | None = None,
+        affinity_key: Callable[[Job], Hashable] | None = None,
     ) -> Generator[tuple[Job, Result | LostJob], None, None]:
         if workers < 1:
             raise ValueError(f"workers is {workers}; give a whole number from 1")
-        room = room or (lambda job: None)
-        pool = ActorPool(self._options, make, jobs, workers=workers, tries=tries, room=room)
+        affinity_key = affinity_key or (lambda job: None)
+        pool = ActorPool(
+            self._options, make, jobs, workers=workers, tries=tries, affinity_key=affinity_key
+        )
         return pool.results()
 
     def start_env_worker(self, slots: Sequence[int], env: Mapping[str, Any]) -> EnvWorker:

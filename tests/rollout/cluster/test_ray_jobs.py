@@ -84,7 +84,9 @@ def test_a_worker_that_cannot_be_made_is_the_same_error_as_here(worker_backend):
 
 def test_a_worker_keeps_to_its_room(worker_backend):
     jobs = [(room, number) for number in range(30) for room in "ab"]
-    results = worker_backend.run_jobs(ray_jobs.Troubled, jobs, workers=2, room=lambda job: job[0])
+    results = worker_backend.run_jobs(
+        ray_jobs.Troubled, jobs, workers=2, affinity_key=lambda job: job[0]
+    )
     homes = {(pid, job[0]) for job, (_, pid) in results}
     assert len(homes) <= 3  # who has finished a room helps with the other
 
