@@ -34,16 +34,16 @@ def test_each_problem_is_told_and_each_try_counted_once(capsys):
     tries = [("one", []), ("two", iter(["late", "loud"])), ("three", ["lost"])]
     done = tally("things", tries)
     assert capsys.readouterr().out == "two: late\ntwo: loud\nthree: lost\n"
-    assert (done.tried, done.short) == (3, 2)
+    assert (done.tried, done.failed) == (3, 2)
     assert str(done).startswith("3 things in ")
     both = Tally("all", 1, 1, 2.0) + done
-    assert (both.what, both.tried, both.short) == ("all", 4, 3)
+    assert (both.what, both.tried, both.failed) == ("all", 4, 3)
 
 
-@pytest.mark.parametrize(("short", "code"), [(0, 0), (2, 1)])
-def test_a_failure_is_the_exit_code(short, code):
+@pytest.mark.parametrize(("failed", "code"), [(0, 0), (2, 1)])
+def test_a_failure_is_the_exit_code(failed, code):
     with pytest.raises(SystemExit) as ended:
-        end(Tally("things", 3, short))
+        end(Tally("things", 3, failed))
     assert ended.value.code == code
 
 

@@ -60,7 +60,7 @@ def test_light_commands_work_with_and_without_a_terminal_anywhere(capsys):
     tally = terminals.check(["envs"], checkout=False)
     tally += terminals.check(["report OUT/none"], checkout=False)
     assert tally.tried == 4
-    assert tally.short == 0, capsys.readouterr().out
+    assert tally.failed == 0, capsys.readouterr().out
 
 
 def test_what_a_terminal_check_notices(tmp_path, monkeypatch, capsys):
@@ -76,4 +76,4 @@ def test_what_a_terminal_check_notices(tmp_path, monkeypatch, capsys):
         line = terminals.Line("", makes="out" if what == "no file" else "", json=what == "no JSON")
         monkeypatch.setattr(terminals, "LINES", (line,))
         command = [sys.executable, "-c", program]
-        assert terminals.check(command=command, checkout=False).short, what
+        assert terminals.check(command=command, checkout=False).failed, what
