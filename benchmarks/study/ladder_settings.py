@@ -14,7 +14,7 @@ from benchmarks.study.settings import (
     PlaySettings,
     Positive,
     StrictSettings,
-    Taught,
+    TeacherData,
 )
 
 Control: TypeAlias = Literal["random", "blind"]
@@ -106,7 +106,7 @@ class StageSettings(StrictSettings):
     """
 
     collect: Collected | None = None
-    teacher: Taught | None = None
+    teacher: TeacherData | None = None
     sample: Sampled | None = None
     again: bool = False
     finetune: str

@@ -33,8 +33,8 @@ class Collected(StrictSettings):
     recipe: str = "paper"
 
 
-class Taught(StrictSettings):
-    """Successful episodes of another agent.
+class TeacherData(StrictSettings):
+    """Successful episodes of a teacher: another agent.
 
     Attributes:
         agent: as ``er-gym bench`` takes it, such as ``searcher``.
