@@ -13,7 +13,7 @@ import yaml
 from pydantic import ValidationError
 
 from benchmarks.monitor.charts import as_svg
-from benchmarks.monitor.growth import changed, in_use
+from benchmarks.monitor.fingerprint import changed, in_use
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.places import Place
 from benchmarks.monitor.run_view import RunSummary, Tally

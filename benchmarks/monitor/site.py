@@ -18,7 +18,7 @@ from benchmarks.monitor import formats, svg
 from benchmarks.monitor.episode_view import MOST_TEXT
 from benchmarks.monitor.event_tail import EpisodeRow
 from benchmarks.monitor.failure_counts import FailureCounts
-from benchmarks.monitor.growth import growth
+from benchmarks.monitor.fingerprint import fingerprint
 from benchmarks.monitor.language import Translator, chosen_language
 from benchmarks.monitor.places import Kind, Place, Places
 from benchmarks.monitor.run_view import RunSummary, run_views
@@ -160,7 +160,7 @@ class Site:
             closely: whether a page shows it alone, and so why its episodes failed.
         """
         if place.kind != "run":
-            return growth(place)
+            return fingerprint(place)
         with self.runs.use(place) as view:
             if closely:
                 view.count_failures(_COUNT_SECONDS)

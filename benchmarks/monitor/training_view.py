@@ -12,8 +12,8 @@ import yaml
 
 from benchmarks.monitor.charts import as_svg
 from benchmarks.monitor.curve_tail import CurveTail, last_line
+from benchmarks.monitor.fingerprint import changed, in_use
 from benchmarks.monitor.followed import Followed
-from benchmarks.monitor.growth import changed, in_use
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.places import Place
 from benchmarks.scoring.series import Axis, Chart, Series

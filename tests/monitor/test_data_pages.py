@@ -13,8 +13,8 @@ from fastapi.testclient import TestClient
 from played_collection import make_collection
 
 from benchmarks.monitor.collection_index import CollectionIndex
+from benchmarks.monitor.fingerprint import fingerprint
 from benchmarks.monitor.flow import flow
-from benchmarks.monitor.growth import growth
 from benchmarks.monitor.places import Places
 from er_gym.data.collection import TRAJECTORIES, Collection
 from er_gym.data.statistics import statistics
@@ -225,14 +225,14 @@ def test_a_collection_that_is_being_made_can_be_followed(collection, tmp_path, v
     (growing / "collection.json").write_text(collection.manifest.model_dump_json())
     client = visit(tmp_path)
     (place,) = Places([tmp_path]).of_kind("collection")
-    before = growth(place)
+    before = fingerprint(place)
     assert "when it ends or is interrupted" in client.get(f"/data/{place.id}").text
     part = growing / "parts" / "imitation"
     part.mkdir()
     (part / "events.jsonl").write_text(
         '{"time":1.0,"kind":"run_begun","suite":"s","agent":"a","tasks":9,"done":0}\n'
     )
-    assert growth(place) != before
+    assert fingerprint(place) != before
     assert "imitation stopped 0 of 9" in said(client.get(f"/data/{place.id}").text)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from fastapi.testclient import TestClient
 from filelock import lock_descriptor
 
-from benchmarks.monitor.growth import growth, in_use
+from benchmarks.monitor.fingerprint import fingerprint, in_use
 from benchmarks.monitor.places import Places
 from benchmarks.study.kinds import ABLATION, LADDER, Study
 from benchmarks.study.run import DonePhase, Plan, PlanRecord
@@ -89,10 +89,10 @@ def test_a_fine_tuning_grows_while_it_is_looked_at(tmp_path, visit):
     assert "100 / 400" in said(first)  # one of four epochs
     assert len(re.findall(r'<svg class="chart"', first)) == 4
     (place,) = Places([tmp_path]).all()
-    before = growth(place)
+    before = fingerprint(place)
     with (folder / "metrics.jsonl").open("a") as log:
         log.write(metric(200, 0.25))
-    assert growth(place) != before
+    assert fingerprint(place) != before
     second = page(client, tmp_path, "tuning")
     assert "200 / 400" in said(second)
     assert "0.25" in said(second)

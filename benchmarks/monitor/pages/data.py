@@ -16,7 +16,7 @@ from benchmarks.monitor.data_view import (
     turns_of,
 )
 from benchmarks.monitor.episode_view import file_inside
-from benchmarks.monitor.growth import changed, in_use, parts_of
+from benchmarks.monitor.fingerprint import changed, in_use, parts_of
 from benchmarks.monitor.listing import neighbours, page_of
 from benchmarks.monitor.pages.replays import ReplayPages
 from benchmarks.monitor.places import Place

@@ -1,5 +1,7 @@
-"""Whether a directory is in use, and what changes when it grows: from its files' names and sizes
-alone, so that it can be asked often."""
+"""Whether a directory is in use, and a fingerprint that changes whenever it does.
+
+Both come from its files' names, times and sizes alone, so that they can be asked often.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +20,11 @@ _GROWING: Mapping[Kind, Sequence[str]] = {
     "ablation": ("ablation.json", "result.json", LOCK),
     "collection": ("collection.json", "trajectories.jsonl", "parts", LOCK),
 }
-"""The files whose growth is a directory's."""
+"""The files by whose times and sizes a directory is seen to change."""
 _MOST_PARTS = 50
 
 
-def growth(place: Place) -> object:
+def fingerprint(place: Place) -> object:
     """What changes whenever a directory does that is no run."""
     names = list(_GROWING.get(place.kind, ()))
     if place.kind == "collection":
