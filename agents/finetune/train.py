@@ -25,7 +25,7 @@ import er_gym
 from agents.finetune import machine
 from agents.finetune.batches import Collator, EncodedChats, Order
 from agents.finetune.feedback import FEEDBACK, add_feedback, add_rows, needs_feedback
-from agents.finetune.libraries import fast_arithmetic, quiet_libraries
+from agents.finetune.libraries import flush_denormals, quiet_libraries
 from agents.finetune.loop import FinetuneTrainer, Progress, TrainingLog, is_sharded
 from agents.finetune.memory import Memory, Plan, memory, numbers_of, size
 from agents.finetune.model_files import (
@@ -43,7 +43,7 @@ from agents.finetune.samples import Samples, open_samples
 from agents.finetune.settings import FinetuneSettings, Lora
 from agents.finetune.tokens import EncodedChat, Encoder, check_lengths
 from agents.vlm.clients.adapters import adapter_chain, with_adapter
-from agents.vlm.clients.checkpoint import load_weights, one_line
+from agents.vlm.clients.checkpoint import error_summary, load_weights
 from agents.vlm.tuned_model import recorded_pictures
 from er_gym.activity import begin
 
@@ -239,7 +239,7 @@ def _train(
     if last is not None:
         say(f"continues after update {done:,}")
     begin("training")
-    with fast_arithmetic():
+    with flush_denormals():
         trainer.train(resume_from_checkpoint=str(last) if last else None)
 
     # -- the result --
@@ -303,7 +303,7 @@ def _arguments(
             log_level="error",
         )
     except (OSError, ImportError, json.JSONDecodeError) as error:
-        raise ValueError(f"training.deepspeed or training.fsdp: {one_line(error)}") from None
+        raise ValueError(f"training.deepspeed or training.fsdp: {error_summary(error)}") from None
 
 
 def _optimizer(network: Any, settings: FinetuneSettings) -> MuonAdamW | None:
@@ -361,7 +361,7 @@ def _load(files: ModelFiles, settings: FinetuneSettings, dtype: str) -> Any:
         for adapter in adapter_chain(files.path)[1]:
             network = with_adapter(network, adapter, merge=True)
     except Exception as error:  # what broken files make of the libraries can be any exception
-        raise ValueError(f"{files.path} cannot be loaded: {one_line(error)}") from None
+        raise ValueError(f"{files.path} cannot be loaded: {error_summary(error)}") from None
     if missing:
         raise ValueError(f"{files.base}: {missing}")
     return network
@@ -401,7 +401,7 @@ def _with_lora(
     try:
         network = peft.get_peft_model(network, config)
     except ValueError as error:
-        raise ValueError(f"model.lora does not fit the model: {one_line(error)}") from None
+        raise ValueError(f"model.lora does not fit the model: {error_summary(error)}") from None
     network.peft_config["default"].base_model_name_or_path = str(files.path)
     return network
 

@@ -149,7 +149,7 @@ def _train(
             if config.warm_start is not None:
                 assert isinstance(model, MaskablePPO)  # as the configuration has checked
                 begin(f"cloning {config.warm_start.teacher}")
-                with fast_arithmetic():
+                with training_speedups():
                     warm_start(model, config, config.warm_start, run, seed, show_progress)
                 logger.dump(0)  # a line with its duration
                 save(model, run)
@@ -162,7 +162,7 @@ def _train(
             log_again(run / MODEL, model)
         begin("loading the rooms")
         try:
-            with fast_arithmetic():
+            with training_speedups():
                 model.learn(
                     max(config.total_steps - steps, 0),
                     callback=CallbackList(callbacks),
@@ -184,7 +184,7 @@ def _train(
 
 
 @contextmanager
-def fast_arithmetic() -> Iterator[None]:
+def training_speedups() -> Iterator[None]:
     """Flush denormal numbers to 0 and skip the validation of distributions within the context."""
     # Adam's moments of weights without gradient, such as those of types in no training room, decay
     # to denormal numbers, which makes every operation a hundred times slower.

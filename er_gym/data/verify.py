@@ -17,7 +17,7 @@ from er_gym.data.line_index import Line, lines_of, trajectory_at
 from er_gym.data.replay import replay
 from er_gym.data.trajectory import Trajectory
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.rollout.play import one_line
+from er_gym.rollout.play import error_with_location
 from er_gym.rollout.processes import Terminated
 from er_gym.rollout.worker_backend import LOCAL_BACKEND, WorkerBackend
 from er_gym.rollout.worker_pool import LostJob
@@ -221,7 +221,7 @@ class _Worker:
             raise
         except Exception as error:  # damaged records may raise anything
             self.close()
-            return [one_line(error)]
+            return [error_with_location(error)]
 
     def _of(self, part: str) -> EmbodiedEnv:
         """The environment of a part; that of the part before is closed."""

@@ -14,7 +14,7 @@ from er_gym.rollout.agent import (
     MakeAgent,
     check_attachments,
 )
-from er_gym.rollout.play import episode_seed, one_line
+from er_gym.rollout.play import episode_seed, error_with_location
 from er_gym.rollout.records import EpisodeRecord, record_episode
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.rollout.worker_backend import LOCAL_BACKEND, WorkerBackend
@@ -58,7 +58,7 @@ class PlayedEpisode:
         except CannotGoOn:
             raise
         except Exception as error:  # agents are other people's code and must not end the run
-            problem = record.error or one_line(error)
+            problem = record.error or error_with_location(error)
             crashed = {"success": False, "end_reason": "", "error": problem}
             return cls(record.model_copy(update=crashed))
         return cls(record, files, folders)

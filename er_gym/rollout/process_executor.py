@@ -22,7 +22,7 @@ from er_gym.rollout.executor import (
     EpisodeSettings,
     PlayedEpisode,
 )
-from er_gym.rollout.play import one_line, play_episode
+from er_gym.rollout.play import error_with_location, play_episode
 from er_gym.rollout.processes import Terminated
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.worker_pool import LostJob
@@ -144,7 +144,7 @@ class EpisodeWorker:
         except Terminated:
             raise
         except (Exception, SystemExit) as error:  # it must not end the run, as in play_episode
-            return PlayedEpisode(self._settings.unbegun(task, one_line(error)))
+            return PlayedEpisode(self._settings.unbegun(task, error_with_location(error)))
         try:
             record = play_episode(
                 self._env,

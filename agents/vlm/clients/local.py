@@ -30,7 +30,7 @@ from agents.vlm.chat import (
     template_message,
 )
 from agents.vlm.clients.batching import CLOSED, SteppedJobs, batches
-from agents.vlm.clients.checkpoint import load, one_line
+from agents.vlm.clients.checkpoint import error_summary, load
 from agents.vlm.clients.kept_turns import (
     KeptConversations,
     KeptTurns,
@@ -203,7 +203,7 @@ class LocalClient:
         except (jinja2.TemplateError, TypeError) as error:
             raise CannotGoOn(
                 f"{self._name}: its chat template does not accept this conversation: "
-                f"{one_line(error)}"
+                f"{error_summary(error)}"
             ) from None
         return text
 
@@ -230,7 +230,7 @@ class LocalClient:
             )
         except (OSError, ValueError) as error:
             raise ConversationRefused(
-                f"a picture cannot be processed: {one_line(error)}", REQUEST
+                f"a picture cannot be processed: {error_summary(error)}", REQUEST
             ) from None
         return seen["pixel_values"], seen["image_grid_thw"]
 
@@ -436,6 +436,6 @@ def _explained(error: RuntimeError, rows: Sequence[EncodedPrompt]) -> Exception:
         )
     if isinstance(error, getattr(torch, "AcceleratorError", ())):
         return CannotGoOn(
-            f"the device failed, and this process cannot use it again: {one_line(error)}"
+            f"the device failed, and this process cannot use it again: {error_summary(error)}"
         )
     return error
