@@ -16,7 +16,7 @@ from benchmarks.monitor.charts import as_svg
 from benchmarks.monitor.fingerprint import changed, in_use
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.places import Place
-from benchmarks.monitor.run_view import RunSummary, Tally
+from benchmarks.monitor.run_view import RunSummary, SuccessCount
 from benchmarks.scoring.metrics import Estimate
 from benchmarks.study.charts import Shown
 from benchmarks.study.kinds import KINDS, Study
@@ -32,7 +32,7 @@ class Inside(Protocol):
     def place(self, out: str) -> Place | None:
         """What is in a directory, relative to the plan's."""
 
-    def run(self, place: Place) -> tuple[RunSummary, Sequence[Tally]]:
+    def run(self, place: Place) -> tuple[RunSummary, Sequence[SuccessCount]]:
         """A run, and its success by group of tasks."""
 
 
@@ -69,8 +69,8 @@ class Measured:
     name: str
     faults: float
     runs: Sequence[RunSummary]
-    success: Tally
-    groups: Mapping[str, Tally]
+    success: SuccessCount
+    groups: Mapping[str, SuccessCount]
 
     @property
     def shown(self) -> Shown:
@@ -180,18 +180,18 @@ def _measured(of: Measurement, inside: Inside) -> Measured:
     places = [inside.place(out) for out in of.runs.values()]
     told = [inside.run(place) for place in places if place is not None and place.kind == "run"]
     runs = [summary for summary, _ in told]
-    by_group: dict[str, list[Tally]] = {}
+    by_group: dict[str, list[SuccessCount]] = {}
     for _, groups in told:
-        for tally in groups:
-            by_group.setdefault(tally.name, []).append(tally)
+        for count in groups:
+            by_group.setdefault(count.name, []).append(count)
     return Measured(
         name=of.name,
         faults=of.faults,
         runs=runs,
         success=_sum(of.name, [run.success for run in runs]),
-        groups={group: _sum(group, tallies) for group, tallies in by_group.items()},
+        groups={group: _sum(group, counts) for group, counts in by_group.items()},
     )
 
 
-def _sum(name: str, tallies: Sequence[Tally]) -> Tally:
-    return Tally.over(name, [result for each in tallies for result in each.results])
+def _sum(name: str, counts: Sequence[SuccessCount]) -> SuccessCount:
+    return SuccessCount.over(name, [result for each in counts for result in each.results])

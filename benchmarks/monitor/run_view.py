@@ -82,7 +82,7 @@ def _within(number: int, bounds: str) -> bool:
 
 
 @dataclass(frozen=True)
-class Tally:
+class SuccessCount:
     """A count of successes, as reports have it (:mod:`er_gym.rollout.outcomes`).
 
     Attributes:
@@ -108,19 +108,19 @@ class Tally:
         return sum(success for _, success in self.results)
 
     @staticmethod
-    def over(name: str, results: Sequence[tuple[str, bool]]) -> Tally:
+    def over(name: str, results: Sequence[tuple[str, bool]]) -> SuccessCount:
         """Count some results."""
         if not results:
-            return Tally(name)
+            return SuccessCount(name)
         tasks, successes = zip(*results, strict=True)
         estimate = success_rate(tasks, successes)
-        return Tally(name, results, estimate.mean, estimate.low, estimate.high)
+        return SuccessCount(name, results, estimate.mean, estimate.low, estimate.high)
 
     @staticmethod
-    def of(name: str, rows: Iterable[EpisodeRow]) -> Tally:
+    def of(name: str, rows: Iterable[EpisodeRow]) -> SuccessCount:
         """Count the episodes of a run."""
         told = [(row.key, row.result) for row in rows]
-        return Tally.over(
+        return SuccessCount.over(
             name, [(task_of_key(key), row.success) for key, row in told if row is not None]
         )
 
@@ -151,7 +151,7 @@ class RunSummary:
     wanted: int
     finished: int
     counts: Mapping[str, int]
-    success: Tally
+    success: SuccessCount
     spent: Cost
     decisions_per_second: float
     seconds_left: float | None
@@ -234,7 +234,7 @@ class RunView:
             wanted=wanted,
             finished=finished,
             counts=counts,
-            success=Tally.of("", rows),
+            success=SuccessCount.of("", rows),
             spent=self._spending.spent or _of_replies(rows),
             decisions_per_second=_speed(rows, tail.time),
             seconds_left=left,
@@ -251,7 +251,7 @@ class RunView:
         """The rows that a filter takes, sorted."""
         return filter.chosen(self._rows.values())
 
-    def tallies(self) -> tuple[list[Tally], list[Tally]]:
+    def success_counts(self) -> tuple[list[SuccessCount], list[SuccessCount]]:
         """Success by group and by task type, in the order of the paper's table."""
         by_type: dict[str, list[EpisodeRow]] = {}
         for row in self._rows.values():
@@ -260,8 +260,8 @@ class RunView:
         for name, rows in by_type.items():
             by_group.setdefault(_group(name), []).extend(rows)
         return (
-            [Tally.of(name, rows) for name, rows in by_group.items()],
-            [Tally.of(name, rows) for name, rows in sorted(by_type.items())],
+            [SuccessCount.of(name, rows) for name, rows in by_group.items()],
+            [SuccessCount.of(name, rows) for name, rows in sorted(by_type.items())],
         )
 
     def choices(self) -> dict[str, list[str]]:

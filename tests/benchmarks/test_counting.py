@@ -50,8 +50,8 @@ def shown(run: Path) -> tuple[int, float | None, float | None, float | None]:
     """The same, as the monitor has them."""
     view = RunView(Places([run]).of_kind("run")[0])
     view.read()
-    tally = view.summary().success
-    return tally.n, tally.rate, tally.low, tally.high
+    count = view.summary().success
+    return count.n, count.rate, count.low, count.high
 
 
 def logged(run: Path) -> dict[int, float]:

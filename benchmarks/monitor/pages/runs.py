@@ -29,7 +29,7 @@ def _paper_rows() -> list[tuple[str, Mapping[str, float], float]]:
 
 def run_variables(view: RunView, chosen: Filter) -> dict[str, Any]:
     """What the page of a run says."""
-    groups, types = view.tallies()
+    groups, types = view.success_counts()
     choices = view.choices()
     return {
         "run": view.summary(),

@@ -8,7 +8,7 @@ from typing import Any
 from fastapi import Request, Response
 
 from benchmarks.monitor.places import Place
-from benchmarks.monitor.run_view import RunSummary, Tally
+from benchmarks.monitor.run_view import RunSummary, SuccessCount
 from benchmarks.monitor.site import NothingThere, Routes, Site
 from benchmarks.monitor.training_view import (
     Trained,
@@ -93,6 +93,6 @@ class _Inside:
     def place(self, out: str) -> Place | None:
         return self.places.get(self._path / out)
 
-    def run(self, place: Place) -> tuple[RunSummary, Sequence[Tally]]:
+    def run(self, place: Place) -> tuple[RunSummary, Sequence[SuccessCount]]:
         with self._site.runs.use(place) as view:
-            return view.summary(), view.tallies()[0]
+            return view.summary(), view.success_counts()[0]
