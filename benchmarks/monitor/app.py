@@ -15,6 +15,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware.base import RequestResponseEndpoint
 
+from benchmarks.monitor.directories import Directories
 from benchmarks.monitor.pages.compare import ComparePages
 from benchmarks.monitor.pages.data import DataPages
 from benchmarks.monitor.pages.episodes import EpisodePages
@@ -23,7 +24,6 @@ from benchmarks.monitor.pages.play import PlayPages
 from benchmarks.monitor.pages.runs import RunPages
 from benchmarks.monitor.pages.static import StaticPages
 from benchmarks.monitor.pages.training import TrainingPages
-from benchmarks.monitor.places import Places
 from benchmarks.monitor.site import NothingThere, Site
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def make_app(
         vlm_run: the run of a vision-language agent that a person watches, by its name; None for
             one without any options.
     """
-    site = Site(Places(roots if play is None else (*roots, play)))
+    site = Site(Directories(roots if play is None else (*roots, play)))
     closing = closing or threading.Event()
     playing = PlayPages(site, closing, play, vlm_run)
 

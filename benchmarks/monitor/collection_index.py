@@ -18,9 +18,9 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.followed import Followed
 from benchmarks.monitor.line_tail import LineFollower, Lines
-from benchmarks.monitor.places import Place
 from er_gym.data.collection import TRAJECTORIES
 from er_gym.data.paper_figures import ACTION, BEGIN
 from er_gym.data.statistics import Statistics
@@ -199,12 +199,14 @@ class Collections(Followed[CollectionIndex]):
     """The collections that were looked at last; safe for threads."""
 
     def __init__(self) -> None:
-        super().__init__(lambda place: CollectionIndex(place.path / TRAJECTORIES), _MOST_KEPT)
+        super().__init__(
+            lambda directory: CollectionIndex(directory.path / TRAJECTORIES), _MOST_KEPT
+        )
         self._counts: dict[Path, tuple[tuple[int, int, int], int]] = {}
 
-    def count(self, place: Place) -> int | None:
+    def count(self, directory: Directory) -> int | None:
         """How many lines a collection has; None if there is no file (yet)."""
-        file = place.path / TRAJECTORIES
+        file = directory.path / TRAJECTORIES
         try:
             status = file.stat()
             state = status.st_ino, status.st_size, status.st_mtime_ns

@@ -10,7 +10,7 @@ import socket
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from benchmarks.monitor.places import Kind, Place
+from benchmarks.monitor.directories import Directory, Kind
 from er_gym.locking import LOCK
 
 _GROWING: Mapping[Kind, Sequence[str]] = {
@@ -24,12 +24,12 @@ _GROWING: Mapping[Kind, Sequence[str]] = {
 _MOST_PARTS = 50
 
 
-def fingerprint(place: Place) -> object:
+def fingerprint(directory: Directory) -> object:
     """What changes whenever a directory does that is no run."""
-    names = list(_GROWING.get(place.kind, ()))
-    if place.kind == "collection":
-        names += [f"parts/{part}/events.jsonl" for part in parts_of(place.path)]
-    return tuple(_state(place.path / name) for name in names)
+    names = list(_GROWING.get(directory.kind, ()))
+    if directory.kind == "collection":
+        names += [f"parts/{part}/events.jsonl" for part in parts_of(directory.path)]
+    return tuple(_state(directory.path / name) for name in names)
 
 
 def parts_of(collection: Path) -> list[str]:
@@ -42,9 +42,9 @@ def parts_of(collection: Path) -> list[str]:
     return sorted(found)[:_MOST_PARTS]
 
 
-def changed(place: Place) -> float:
+def changed(directory: Directory) -> float:
     """When it changed last, seconds since the epoch; 0 if unknown."""
-    told = [_state(place.path / name) for name in _GROWING.get(place.kind, ())]
+    told = [_state(directory.path / name) for name in _GROWING.get(directory.kind, ())]
     return max((each[0] for each in told if each), default=0) / 1e9
 
 

@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.event_tail import EpisodeRow, EventTail
 from benchmarks.monitor.failure_counts import FailureCounts
 from benchmarks.monitor.followed import Followed
 from benchmarks.monitor.listing import AddressFilter
-from benchmarks.monitor.places import Place
 from benchmarks.monitor.record_rows import RecordRows
 from benchmarks.monitor.spending_tail import SpendingTail
 from benchmarks.scoring.metrics import success_rate
@@ -130,7 +130,7 @@ class RunSummary:
     """A run at a moment.
 
     Attributes:
-        place: its directory.
+        directory: where it is.
         manifest: what is played; None if that cannot be read, and ``problem`` says why.
         state: ``playing``, ``finished``, ``stopped`` or ``waiting``.
         wanted: how many episodes it is to have.
@@ -144,7 +144,7 @@ class RunSummary:
         version: changes when anything does.
     """
 
-    place: Place
+    directory: Directory
     manifest: Manifest | None
     problem: str
     state: str
@@ -164,11 +164,11 @@ class RunView:
     """A run, followed while it grows. One thread at a time may use it.
 
     Attributes:
-        place: its directory.
+        directory: where it is.
         failures: why its episodes failed.
     """
 
-    place: Place
+    directory: Directory
     failures: FailureCounts = field(default_factory=FailureCounts)
     _tail: EventTail = field(init=False)
     _records: RecordRows = field(init=False)
@@ -178,15 +178,15 @@ class RunView:
     _problem: str = ""
 
     def __post_init__(self) -> None:
-        self._tail = EventTail(self.place.path / EVENTS)
-        self._records = RecordRows(self.place.path)
-        self._spending = SpendingTail(self.place.path / SPENDING)
+        self._tail = EventTail(self.directory.path / EVENTS)
+        self._records = RecordRows(self.directory.path)
+        self._spending = SpendingTail(self.directory.path / SPENDING)
 
     def read(self) -> None:
         """Read what is new."""
         if self._manifest is None:
             try:
-                self._manifest = RunDirectory.open(self.place.path).manifest
+                self._manifest = RunDirectory.open(self.directory.path).manifest
                 self._problem = ""
             except (RunDirectoryError, OSError) as error:
                 self._problem = str(error)
@@ -197,7 +197,7 @@ class RunView:
     def count_failures(self, seconds: float) -> None:
         """Read why episodes failed, for a while."""
         try:
-            run = RunDirectory.open(self.place.path)
+            run = RunDirectory.open(self.directory.path)
         except (RunDirectoryError, OSError):
             return
         self.failures.read(run, self._rows, seconds)
@@ -227,7 +227,7 @@ class RunView:
         if state == "playing" and since and spent > 0:
             left = (wanted - finished) * spent / len(since)
         return RunSummary(
-            place=self.place,
+            directory=self.directory,
             manifest=self._manifest,
             problem=self._problem,
             state=state,

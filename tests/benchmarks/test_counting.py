@@ -20,8 +20,8 @@ from unsteady_agent import CRASHES
 
 from benchmarks.cli import main as cli
 from benchmarks.monitor.comparison import difference, pairs_of
+from benchmarks.monitor.directories import Directories
 from benchmarks.monitor.export import Wanted, export
-from benchmarks.monitor.places import Places
 from benchmarks.monitor.run_view import RunView
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.paired import paired_difference
@@ -48,7 +48,7 @@ def told(run: Path) -> tuple[int, float, float | None, float | None]:
 
 def shown(run: Path) -> tuple[int, float | None, float | None, float | None]:
     """The same, as the monitor has them."""
-    view = RunView(Places([run]).of_kind("run")[0])
+    view = RunView(Directories([run]).of_kind("run")[0])
     view.read()
     count = view.summary().success
     return count.n, count.rate, count.low, count.high
@@ -160,7 +160,7 @@ def test_a_comparison_counts_as_the_reports_do(run: Path, er_gym: Command) -> No
     assert code == 0, err
     rows = []
     for each in (run, other):
-        view = RunView(Places([each]).of_kind("run")[0])
+        view = RunView(Directories([each]).of_kind("run")[0])
         view.read()
         rows.append(view.rows)
     found = difference("", pairs_of(*rows))

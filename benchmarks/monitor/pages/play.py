@@ -181,7 +181,7 @@ class PlayPages:
             "keys": KEYS,
             "problem": problem,
             "secret": self._forms.secret,
-            "place": self._site.places.at(run, "run"),
+            "directory": self._site.directories.at(run, "run"),
             "scripts": ("play.js",),
         }
         return self._site.show(request, "play_session.html", variables, status)
