@@ -120,7 +120,7 @@ def uninstall() -> tuple[Release, ...]:
 
 def still_aside() -> list[Path]:
     """Files that :func:`install` set aside and whose place is taken, so that they stay there."""
-    return [place.set_aside for place in _CLIENT_FILES if os.path.lexists(place.set_aside)]
+    return [file.set_aside for file in _CLIENT_FILES if os.path.lexists(file.set_aside)]
 
 
 @contextlib.contextmanager

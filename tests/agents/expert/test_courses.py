@@ -14,7 +14,7 @@ from agents.expert.candidates import Candidate, CandidateSequence
 from agents.expert.corrections import Beginning, first_mistake
 from agents.expert.explorer import Strength
 from agents.expert.legs import legs_of
-from agents.expert.places import candidates, draw_places, plan_of
+from agents.expert.places import draw_places, likely_places, plan_of
 from agents.expert.recipe import load_recipe
 from agents.expert.takeover import goals_left
 from agents.scripted.searcher import instruction as words
@@ -250,7 +250,7 @@ def test_a_sure_explorer_visits_the_likeliest_places_first(env: EmbodiedEnv) -> 
                 continue
             visits += 1
             leg = next(one for one in legs_of(each.task) if intent.subgoal in one.subgoals)
-            there = candidates(leg.thing, view.navigable, without=before)
+            there = likely_places(leg.thing, view.navigable, without=before)
             assert (place, intent.plan[0]) == (draw_places(there, 1, Random(0), 0.0)[0], place)
             before.append(place)
     assert visits > 40
