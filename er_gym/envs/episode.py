@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs import skills
-from er_gym.envs.action_handler import ActionHandler, EpisodeSetup, Moment
+from er_gym.envs.action_handler import ActionHandler, EpisodeSetup, StepContext
 from er_gym.envs.actions import Action, AnyAction
 from er_gym.envs.faults import FaultPlan, FaultyActionHandler
 from er_gym.envs.info import REPEATED, Details, Info, LegalActions
@@ -180,7 +180,7 @@ class Episode:
             object_id, outcome = "", skills.Outcome(None, False, refused)
         else:
             object_id, outcome = self._handler.execute(
-                understood, Moment(self.perception, self._available, self._progress.left)
+                understood, StepContext(self.perception, self._available, self._progress.left)
             )
             self._fault = "" if self._faulty is None else self._faulty.fault
         self._memory.act(understood, outcome.success)
