@@ -154,7 +154,7 @@ def readers() -> Mapping[str, Reader]:
     from agents.expert.model_places import named_places
     from agents.expert.own_words import split_speech
     from agents.expert.writers.replies import OwnWords, quoted, read_thought
-    from agents.scripted.searcher.instruction import understand
+    from agents.scripted.searcher.instruction import parse_instruction
     from agents.vlm.chat import Reply
     from agents.vlm.clients.chat_completions import error_text, read_completion, reply_of
     from agents.vlm.clients.failures import refusal_of
@@ -234,7 +234,7 @@ def readers() -> Mapping[str, Reader]:
         "a quotation": lambda text: quoted(Reply(text)),
         "places": lambda text: named_places(text, ["Fridge", "CounterTop"]),
         "a paraphrase": lambda text: usable(text, "Find the Apple.", ["Apple"]),
-        "an instruction": understand.__wrapped__,
+        "an instruction": parse_instruction.__wrapped__,
         "a text of a page": visible,
         "a line of a page": brief,
     }

@@ -38,7 +38,7 @@ _SECOND_WHEN_HOLDING = frozenset({"84", "85"})
 type means the second target while the hand holds something."""
 
 
-def understand_as_paper(action: AnyAction, objects: ObjectTable) -> tuple[Action | None, str]:
+def parse_action_as_paper(action: AnyAction, objects: ObjectTable) -> tuple[Action | None, str]:
     """The action that the paper's runner reads in a text (None if it reads none), and the text.
 
     Case and leading spaces of the text matter for the verb. The object is the last word of the
