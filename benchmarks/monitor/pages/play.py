@@ -16,7 +16,7 @@ from agents.zoo.index import PREFIX, model_names
 from benchmarks.monitor.news import news
 from benchmarks.monitor.play.forms import BadForm, Forms
 from benchmarks.monitor.play.plan import plan, playable, run_path
-from benchmarks.monitor.play.session import Moment, Order, Refused, Session
+from benchmarks.monitor.play.session import Order, Refused, Session, SessionState
 from benchmarks.monitor.play.sessions import Sessions
 from benchmarks.monitor.site import NothingThere, Routes, Site
 from er_gym.envs.actions import parse
@@ -170,7 +170,12 @@ class PlayPages:
         return self._page(request, session, session.now)
 
     def _page(
-        self, request: Request, session: Session, now: Moment, problem: str = "", status: int = 200
+        self,
+        request: Request,
+        session: Session,
+        now: SessionState,
+        problem: str = "",
+        status: int = 200,
     ) -> Response:
         run = session.plan.path.resolve()
         variables = {
@@ -235,8 +240,8 @@ def _run_in(path: Path) -> RunDirectory | None:
         return None
 
 
-def _asked(session: Session, form: Mapping[str, str]) -> Moment:
-    """Do what a form asks for; returns the moment before.
+def _asked(session: Session, form: Mapping[str, str]) -> SessionState:
+    """Do what a form asks for; returns the state before.
 
     Raises:
         Refused: it cannot be done.
