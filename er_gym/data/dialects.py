@@ -202,7 +202,7 @@ class Dialect:
         if system := system_text(texts, trajectory.instruction):
             turns.append(ChatTurn("system", (system,)))
         before: Perceived | None = None
-        last: LastDeed | None = None
+        last: ActionResult | None = None
         for index, turn in enumerate(trajectory.turns):
             now = Perceived.at(turn)
             pictures = [(each.direction, each) for each in turn.pictures]
@@ -211,7 +211,7 @@ class Dialect:
             seen = _seen(texts, trajectory, index, now, before, last)
             reply = _reply(texts, trajectory, index, seen)
             turns.append(ChatTurn("assistant", (reply,), turn.train))
-            before, last = now, LastDeed(str(turn.action), turn.success, turn.feedback)
+            before, last = now, ActionResult(str(turn.action), turn.success, turn.feedback)
         return Chat(trajectory.id, tuple(turns), texts.reply_told)
 
 
@@ -253,7 +253,7 @@ def _read_texts(file: Path) -> DialectTexts:
 
 
 @dataclass(frozen=True)
-class LastDeed:
+class ActionResult:
     """The last action and what came of it.
 
     Attributes:
@@ -289,7 +289,7 @@ def system_text(texts: DialectTexts, instruction: str) -> str:
 def user_turn(
     texts: DialectTexts,
     instruction: str,
-    last: LastDeed | None,
+    last: ActionResult | None,
     pictures: Sequence[tuple[str, Shown]],
     now: Perceived | None = None,
     before: Perceived | None = None,
@@ -324,7 +324,7 @@ def user_turn(
 
 
 def told_scene(
-    texts: DialectTexts, now: Perceived | None, before: Perceived | None, last: LastDeed | None
+    texts: DialectTexts, now: Perceived | None, before: Perceived | None, last: ActionResult | None
 ) -> str:
     """What the agent perceives, in the dialect's words; ``""`` if there is nothing to tell.
 
@@ -356,7 +356,7 @@ def _shown(pictures: Sequence[tuple[str, Shown]]) -> list[tuple[str, Shown]]:
     return sorted(around, key=lambda each: _AROUND_IN_ORDER.index(each[0])) or [*pictures]
 
 
-def _text_for(last: LastDeed | None, directions: Sequence[str]) -> str:
+def _text_for(last: ActionResult | None, directions: Sequence[str]) -> str:
     """The name of the text for a user's turn after the last action, by what is shown."""
     if last is None:
         return "first"
@@ -427,7 +427,7 @@ def _seen(
     index: int,
     now: Perceived,
     before: Perceived | None,
-    last: LastDeed | None,
+    last: ActionResult | None,
 ) -> str:
     """What the assistant says first of what it is shown, in a dialect in which it tells that."""
     shown = bool(trajectory.turns[index].pictures)
