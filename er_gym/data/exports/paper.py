@@ -25,9 +25,9 @@ from collections import Counter
 from pathlib import PurePosixPath
 from typing import Any
 
-from er_gym.data.album import picture_name
 from er_gym.data.dialects import plain
 from er_gym.data.exports.base import ExportFormat, ExportJob
+from er_gym.data.picture_folder import picture_name
 from er_gym.data.trajectory import TAG_OF_KIND, PictureRecord, Trajectory, Turn
 from er_gym.rollout.records import KeyActionRecord
 from er_gym.tasks import verbs
