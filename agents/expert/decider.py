@@ -11,9 +11,9 @@ from agents.expert.candidates import Candidate, Candidates
 from agents.expert.course import Intent, View
 from agents.expert.explorer import Strength
 from agents.expert.legs import at_hand, legs_of
-from agents.expert.own_words import KIND_OF_TAG
 from agents.expert.players import PlaySettings, header_of
 from agents.expert.recipe import Part, Recipe
+from agents.expert.recorded_replies import KIND_OF_TAG
 from agents.expert.recorder import (
     FOLDERS,
     OBS_MODE,

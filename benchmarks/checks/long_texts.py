@@ -152,8 +152,8 @@ def readers() -> Mapping[str, Reader]:
     import numpy as np  # noqa: F401 (before the clock runs)
 
     from agents.expert.model_places import named_places
-    from agents.expert.own_words import split_speech
-    from agents.expert.writers.replies import OwnWords, quoted, read_thought
+    from agents.expert.recorded_replies import split_speech
+    from agents.expert.writers.replies import EchoCheck, quoted, read_thought
     from agents.scripted.searcher.instruction import parse_instruction
     from agents.vlm.chat import Reply
     from agents.vlm.clients.chat_completions import error_text, read_completion, reply_of
@@ -175,7 +175,7 @@ def readers() -> Mapping[str, Reader]:
     from er_gym.tasks.paraphrase import usable
 
     matcher = Matcher(Matching())
-    own = OwnWords.than(["Say what you see and where you go, in one or two sentences."])
+    own = EchoCheck.against(["Say what you see and where you go, in one or two sentences."])
     secrets = Secrets("sk-0123456789abcdef", "http://u:p@h/v1?key=0123456789abcdef")
 
     def knowledge(language: Any) -> Knowledge:
