@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from agents.finetune.launchers.plan import PrintPlan
+from agents.finetune.launchers.plan import LaunchPlan
 from agents.finetune.memory import GIB, Memory, ModelNumbers, Plan, memory
 from agents.finetune.models import load_facts, model_names
 from agents.finetune.settings import FinetuneSettings, Lora
@@ -60,7 +60,7 @@ def expected(
     )
 
 
-def run_table(plan: PrintPlan, *, whole_embeddings: bool) -> Table:
+def run_table(plan: LaunchPlan, *, whole_embeddings: bool) -> Table:
     """A table of this run: at its longest conversation, and at the most it may have."""
     facts, limit = plan.facts, plan.settings.data.max_length
     share = facts.picture_tokens / max(1, facts.tokens)
@@ -83,7 +83,7 @@ def run_table(plan: PrintPlan, *, whole_embeddings: bool) -> Table:
     return Table("", ("GiB on each GPU", *PARTS, "sum"), tuple(lines), 1)
 
 
-def models_table(plan: PrintPlan) -> Table:
+def models_table(plan: LaunchPlan) -> Table:
     """A table of all models that er-gym knows, full and LoRA, at this run's length."""
     facts, settings = plan.facts, plan.settings
     lora = settings.model.lora or Lora()
