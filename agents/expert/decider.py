@@ -19,7 +19,7 @@ from agents.expert.recorder import (
     OBS_MODE,
     TrajectoryHeader,
     TrajectoryRecorder,
-    spoken,
+    thoughts_text,
 )
 from agents.expert.replayed_intents import replayed_purpose
 from agents.expert.writers.prompts import WriterPrompts
@@ -102,7 +102,9 @@ class DecidingAgent:
         )
         if decision.reply is not None:
             recorder.pay([decision.reply])
-        return Decision(decision.action, spoken(thoughts), decision.reply, causes=decision.causes)
+        return Decision(
+            decision.action, thoughts_text(thoughts), decision.reply, causes=decision.causes
+        )
 
     def attachments(self, episode: EpisodeRecord, stem: str) -> dict[str, bytes]:
         """The pictures and the trajectory, by path; empty if the episode crashed."""

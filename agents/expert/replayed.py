@@ -20,7 +20,7 @@ from agents.expert.recorder import (
     OBS_MODE,
     TrajectoryHeader,
     TrajectoryRecorder,
-    spoken,
+    thoughts_text,
 )
 from agents.expert.replayed_intents import replayed_intent
 from agents.expert.thinker import ThinkingAgent
@@ -122,7 +122,7 @@ class QuotingAgent:
         recorder.pay([said.reply])
         limits = self._settings.kinds.limits["alone"]
         thoughts = recorder.think_own(now, said.thoughts, self._name, limits)
-        return Decision(intent.action, spoken(thoughts))
+        return Decision(intent.action, thoughts_text(thoughts))
 
     def attachments(self, episode: EpisodeRecord, stem: str) -> dict[str, bytes]:
         """The pictures and the trajectory, by path; empty if the episode crashed."""

@@ -41,7 +41,7 @@ from agents.rl.callbacks import (
 )
 from agents.rl.config import EnvConfig, Evaluation, TrainConfig, load_config
 from agents.rl.envs import evaluation_config, make_env
-from agents.rl.model_file import log_again, placeholder_env, restore, save
+from agents.rl.model_file import placeholder_env, restore, restore_logged_values, save
 from agents.rl.policy_file import CONFIG, LEARNERS, MODEL
 from agents.rl.policy_observation import PolicyObservation
 from agents.rl.vec_env import WorkerVecEnv
@@ -159,7 +159,7 @@ def _train(
             set_random_seed(seed)
         model.set_logger(logger)
         if (run / MODEL).exists():
-            log_again(run / MODEL, model)
+            restore_logged_values(run / MODEL, model)
         begin("loading the rooms")
         try:
             with training_speedups():

@@ -129,7 +129,7 @@ def bench(options: BenchOptions, executor_options: ExecutorOptions, vlm_options:
     from er_gym.rollout.agent import CannotGoOn
     from er_gym.rollout.outcomes import Outcomes
     from er_gym.rollout.run_directory import Manifest, RunDirectory
-    from er_gym.rollout.runner import episodes_of, tell_late
+    from er_gym.rollout.runner import append_missing_events, episodes_of
     from er_gym.rollout.selection import Shard, select
     from er_gym.rollout.worker_pool import WorkerSetupError
     from er_gym.thor import BackendError
@@ -192,7 +192,7 @@ def bench(options: BenchOptions, executor_options: ExecutorOptions, vlm_options:
                     cost,
                 ),
             ):
-                tell_late(run_directory)
+                append_missing_events(run_directory)
                 tracked = tracking(options.track, out, manifest.model_dump())
                 with progress, tracked as listeners:
                     outcome = play(progress, listeners)

@@ -19,7 +19,7 @@ from er_gym.writing import check_folder, whole_folder, write_atomic
 PROGRAMS: dict[str, Program] = {row.name: row for row in (LLAMA_FACTORY, MS_SWIFT, TRL, DEEPSPEED)}
 """All programs by name."""
 FULL_GPUS, LORA_GPUS = 8, 1
-"""On how many GPUs a run is, if nothing is said."""
+"""On how many GPUs a run trains, if nothing is said."""
 
 
 def write_files(
