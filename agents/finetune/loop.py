@@ -28,7 +28,7 @@ from agents.finetune.run_files import (
     RunFiles,
     draft_of,
     move_into_place,
-    whole_folder,
+    replaced_folder,
 )
 from er_gym.activity import begin
 
@@ -190,7 +190,7 @@ class FinetuneTrainer(transformers.Trainer):
         with ExitStack() as stack:
             folder = draft_of(self._run.model)
             if self.args.should_save:
-                stack.enter_context(whole_folder(self._run.model))
+                stack.enter_context(replaced_folder(self._run.model))
             if is_sharded(self.args):
                 super().save_model(str(folder), _internal_call=True)
             elif self.args.should_save:
