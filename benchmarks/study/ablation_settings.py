@@ -6,11 +6,11 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from agents.configs import StrictSettings
 from benchmarks.study.settings import (
     Collected,
     Evaluation,
     PlaySettings,
-    StrictSettings,
     TeacherData,
 )
 

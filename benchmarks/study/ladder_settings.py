@@ -6,6 +6,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, field_validator, model_validator
 
+from agents.configs import StrictSettings
 from agents.expert.corrections import CorrectAfter, CorrectBy
 from agents.finetune.settings import STAGES, Stage
 from benchmarks.study.settings import (
@@ -13,7 +14,6 @@ from benchmarks.study.settings import (
     Evaluation,
     PlaySettings,
     Positive,
-    StrictSettings,
     TeacherData,
 )
 
