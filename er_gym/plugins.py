@@ -7,7 +7,8 @@ There are two ways to name a plugin:
   ``er_gym.agents``.
 
 A :class:`Registry` looks a name up among er-gym's own objects, then in both of these ways.
-Tables that are complete before anything is looked up take everything that :func:`added` finds.
+Tables that are complete before anything is looked up take everything that :func:`added_objects`
+finds.
 ``docs/extending.md`` has a walk-through for each registry.
 """
 
@@ -148,7 +149,7 @@ def load_entry_point(entry: metadata.EntryPoint, kind: str) -> Any:
         ) from error
 
 
-def added(
+def added_objects(
     kind: str, group: str, variable: str, expected: str, *, registers: bool = False
 ) -> Iterator[tuple[Any, str]]:
     """The objects that an environment variable names and installed packages declare.

@@ -16,7 +16,7 @@ from difflib import get_close_matches
 from functools import lru_cache
 from typing import Protocol
 
-from er_gym.plugins import PluginError, added
+from er_gym.plugins import PluginError, added_objects
 
 GROUP = "er_gym.task_types"
 """The entry points in which packages declare task types."""
@@ -125,7 +125,7 @@ def load_added() -> None:
         PluginError: a row cannot be loaded or used.
     """
     expected = f"an {__name__}.TaskType"
-    for found, origin in added("task type", GROUP, VARIABLE, expected, registers=True):
+    for found, origin in added_objects("task type", GROUP, VARIABLE, expected, registers=True):
         if not isinstance(found, TaskType):
             raise PluginError(f"{origin} is {found!r}; give {expected}")
         register(found)
