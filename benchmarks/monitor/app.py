@@ -24,7 +24,7 @@ from benchmarks.monitor.pages.play import PlayPages
 from benchmarks.monitor.pages.runs import RunPages
 from benchmarks.monitor.pages.static import StaticPages
 from benchmarks.monitor.pages.training import TrainingPages
-from benchmarks.monitor.site import NothingThere, Site
+from benchmarks.monitor.site import NotFound, Site
 
 if TYPE_CHECKING:
     from benchmarks.vlm_run import VLMRun
@@ -84,7 +84,7 @@ def make_app(
             response.headers.setdefault(name, value)
         return response
 
-    @app.exception_handler(NothingThere)
+    @app.exception_handler(NotFound)
     @app.exception_handler(404)
     async def gone(request: Request, error: Exception) -> Response:
         return await run_in_threadpool(site.show, request, "gone.html", {}, 404)

@@ -38,7 +38,7 @@ _MOST_KEPT = 16
 
 
 @dataclass(frozen=True, slots=True)
-class Head:
+class TrajectoryHead:
     """What a list says of a trajectory.
 
     Attributes:
@@ -79,13 +79,13 @@ class CollectionIndex(LineFollower):
 
     longest = 64 * 2**20  # one with more bytes is damaged
 
-    heads: list[Head] = field(default_factory=list)
+    heads: list[TrajectoryHead] = field(default_factory=list)
     found: Statistics = field(default_factory=Statistics)
     lengths: Counter[int] = field(default_factory=Counter)
     damaged: int = 0
     _places: dict[str, int] = field(default_factory=dict)
 
-    def at(self, id: str) -> Head | None:
+    def at(self, id: str) -> TrajectoryHead | None:
         """The trajectory with an id; None if there is none."""
         place = self._places.get(id)
         return None if place is None else self.heads[place]
@@ -121,8 +121,10 @@ class CollectionIndex(LineFollower):
                 found.transitions[before][state] += 1
                 before = state
 
-    def _head(self, offset: int, told: Mapping[str, Any], turns: _Turns, learnt: int) -> Head:
-        return Head(
+    def _head(
+        self, offset: int, told: Mapping[str, Any], turns: _Turns, learnt: int
+    ) -> TrajectoryHead:
+        return TrajectoryHead(
             offset=offset,
             id=_text(told["id"]),
             part=_shared(told.get("part", "")),

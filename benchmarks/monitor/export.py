@@ -65,7 +65,7 @@ class CannotExport(ValueError):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ExportRequest:
     """What is exported.
 
     Attributes:
@@ -121,7 +121,9 @@ class Exported:
         return json.dumps({**values, "scene": row.scene, "text": text})
 
 
-def export(wanted: Wanted, tell: Callable[[int, int], None] = lambda done, of: None) -> Exported:
+def export(
+    wanted: ExportRequest, tell: Callable[[int, int], None] = lambda done, of: None
+) -> Exported:
     """Export a run.
 
     Args:
@@ -144,7 +146,7 @@ def export(wanted: Wanted, tell: Callable[[int, int], None] = lambda done, of: N
     return maker.exported
 
 
-def _check_place(wanted: Wanted) -> None:
+def _check_place(wanted: ExportRequest) -> None:
     out = wanted.out
     if not (out.exists() or out.is_symlink()):
         return
@@ -166,7 +168,7 @@ def _check_place(wanted: Wanted) -> None:
 class _Maker:
     """Makes the pages of an export."""
 
-    def __init__(self, wanted: Wanted) -> None:
+    def __init__(self, wanted: ExportRequest) -> None:
         directories = Directories([wanted.run])
         root = wanted.run.resolve()
         directory = next((p for p in directories.of_kind("run") if p.path == root), None)

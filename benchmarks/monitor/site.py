@@ -36,17 +36,17 @@ _COUNT_SECONDS = 0.3
 """How long failures are counted at a time, while a page waits for news."""
 
 
-class NothingThere(Exception):
+class NotFound(Exception):
     """There is nothing at this address."""
 
 
 @contextmanager
 def or_nothing() -> Iterator[None]:
-    """Within, what cannot be read is not there: raises :class:`NothingThere`."""
+    """Within, what cannot be read is not there: raises :class:`NotFound`."""
     try:
         yield
     except (ValueError, OSError):
-        raise NothingThere from None
+        raise NotFound from None
 
 
 class Site:
@@ -121,11 +121,11 @@ class Site:
         """The directory with an id.
 
         Raises:
-            NothingThere: there is none of this kind.
+            NotFound: there is none of this kind.
         """
         directory = self.directories.get(id)
         if directory is None or directory.kind != kind:
-            raise NothingThere
+            raise NotFound
         return directory
 
     def summary(self, directory: Directory) -> RunSummary:
@@ -171,7 +171,7 @@ class Site:
         """An episode's record, and its run's manifest.
 
         Raises:
-            NothingThere: there is none.
+            NotFound: there is none.
         """
         with or_nothing():
             run = RunDirectory.open(self.directory(id, "run").path)

@@ -21,7 +21,7 @@ from unsteady_agent import CRASHES
 from benchmarks.cli import main as cli
 from benchmarks.monitor.comparison import difference, pairs_of
 from benchmarks.monitor.directories import Directories
-from benchmarks.monitor.export import Wanted, export
+from benchmarks.monitor.export import ExportRequest, export
 from benchmarks.monitor.run_view import RunView
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.paired import paired_difference
@@ -104,7 +104,7 @@ def test_every_surface_tells_the_same_rate(played: tuple[Path, str], er_gym: Com
     assert "33.33" in out
     assert "2 of 6 episodes crashed and count as failures" in out
     page = run.parent / "run.html"
-    export(Wanted(run=run, out=page, episodes=None, draw=False))
+    export(ExportRequest(run=run, out=page, episodes=None, draw=False))
     assert "33.3" in page.read_text(encoding="utf-8")
 
 

@@ -11,7 +11,7 @@ from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.episode_view import EpisodeView, view_of
 from benchmarks.monitor.failures import FAILURES
 from benchmarks.monitor.listing import page_number, page_of
-from benchmarks.monitor.site import NothingThere, Routes, Site, or_nothing
+from benchmarks.monitor.site import NotFound, Routes, Site, or_nothing
 from er_gym.rollout.run_directory import RunDirectory
 
 MOST_RUNS = 12
@@ -96,7 +96,7 @@ class ComparePages:
         """Two episodes of a task, step by step."""
         asked = request.query_params.getlist("of")
         if len(asked) != 2:
-            raise NothingThere
+            raise NotFound
         directories = [self._site.directory(id, "run") for id in asked]
         with or_nothing():
             runs = [RunDirectory.open(directory.path) for directory in directories]

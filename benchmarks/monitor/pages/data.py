@@ -21,7 +21,7 @@ from benchmarks.monitor.fingerprint import changed, in_use, parts_of
 from benchmarks.monitor.listing import neighbours, page_of
 from benchmarks.monitor.pages.replays import ReplayPages
 from benchmarks.monitor.run_view import RunSummary
-from benchmarks.monitor.site import NothingThere, Routes, Site, or_nothing
+from benchmarks.monitor.site import NotFound, Routes, Site, or_nothing
 from benchmarks.monitor.world import CannotReplay
 from er_gym.data.collection import PARTS, Collection, CollectionManifest
 from er_gym.data.line_index import trajectory_at
@@ -128,7 +128,7 @@ class DataPages(ReplayPages):
         with self._collections.use(directory) as index:
             head = index.at(key)
         if head is None:
-            raise NothingThere
+            raise NotFound
         with or_nothing():
             return trajectory_at(Collection.open(directory.path), head.offset)
 

@@ -18,7 +18,7 @@ from benchmarks.monitor.play.forms import BadForm, Forms
 from benchmarks.monitor.play.plan import plan, playable, run_path
 from benchmarks.monitor.play.session import Order, Refused, Session, SessionState
 from benchmarks.monitor.play.sessions import Sessions
-from benchmarks.monitor.site import NothingThere, Routes, Site
+from benchmarks.monitor.site import NotFound, Routes, Site
 from er_gym.envs.actions import parse
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.tasks import verbs
@@ -212,7 +212,7 @@ class PlayPages:
         """A picture of a turn of the episode in play."""
         pictures = self._session(id).now.shown.get(step, ())
         if not 0 <= n < len(pictures):
-            raise NothingThere
+            raise NotFound
         picture = pictures[n]
         return Response(picture.data, media_type=picture.media_type)
 
@@ -228,7 +228,7 @@ class PlayPages:
     def _session(self, id: str) -> Session:
         session = self.sessions.get(id)
         if session is None:
-            raise NothingThere
+            raise NotFound
         return session
 
 

@@ -9,7 +9,7 @@ from fastapi import Request, Response
 
 from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.run_view import RunSummary, SuccessCount
-from benchmarks.monitor.site import NothingThere, Routes, Site
+from benchmarks.monitor.site import NotFound, Routes, Site
 from benchmarks.monitor.training_view import (
     Trained,
     curves,
@@ -57,7 +57,7 @@ class TrainingPages:
         if directory is not None and directory.kind in _PLANS:
             return self._show_plan(request, directory)
         if directory is None or directory.kind not in _CHARTS:
-            raise NothingThere
+            raise NotFound
         t = self._site.translator(request)
         with self._curves.use(directory) as tail:
             run: Trained = trained(directory, tail.last if tail.lines else None)
