@@ -35,7 +35,7 @@ def doing(what: str, count: Count | None = None) -> None:
 
 
 @contextlib.contextmanager
-def saying_what_it_does() -> Iterator[None]:
+def showing_activity() -> Iterator[None]:
     """Within, what lower layers tell is shown; the line is gone at the end, in any case."""
     log, heard = logging.getLogger(_HEARD), _Heard()
     level, propagates = log.level, log.propagate

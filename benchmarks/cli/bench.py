@@ -33,7 +33,7 @@ from benchmarks.cli.options import (
     protocol_option,
     scorer_option,
     seed_option,
-    shared,
+    shared_option,
     split,
     with_options,
 )
@@ -100,14 +100,14 @@ class BenchOptions(OptionGroup):
         type=click.Choice(TRACKERS),
         help="Log the run's figures for this program too; may be repeated.",
     )
-    seed: int = shared(seed_option)
+    seed: int = shared_option(seed_option)
     backend: str | None = option(help="The engine: embedded or unity.  [default: the suite's]")
     instances: str | None = option(
         help="Which object a type name means: target or explore.  [default: the suite's]",
     )
-    protocol: str = shared(protocol_option)
-    faults: Faults | None = shared(faults_option)
-    scorer: str = shared(scorer_option)
+    protocol: str = shared_option(protocol_option)
+    faults: Faults | None = shared_option(faults_option)
+    scorer: str = shared_option(scorer_option)
 
 
 @click.command(name="bench")

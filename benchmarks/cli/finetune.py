@@ -16,7 +16,7 @@ from benchmarks.cli.options import (
     Words,
     option,
     overrides_option,
-    shared,
+    shared_option,
     with_options,
 )
 from benchmarks.terminal import echo
@@ -41,7 +41,9 @@ class FinetuneOptions(OptionGroup):
         help="The settings: a YAML file, or the name of one that comes with er-gym, such as "
         "stage1.",
     )
-    overrides: tuple[str, ...] = shared(overrides_option("training.epochs=2 or model.lora.rank=16"))
+    overrides: tuple[str, ...] = shared_option(
+        overrides_option("training.epochs=2 or model.lora.rank=16")
+    )
     model: str = option(
         required=True,
         type=Words(),

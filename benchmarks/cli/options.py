@@ -44,7 +44,7 @@ def option(flag: str = "", **settings: Any) -> Any:
     return field(default=empty, metadata={"flag": flag, "settings": settings})
 
 
-def shared(add: Any) -> Any:
+def shared_option(add: Any) -> Any:
     """A field of a group that an option fills which other commands have, too."""
     (made,) = add(lambda: None).__click_params__
     return field(default=() if made.multiple else None, metadata={"add": add, "flag": made.opts[0]})

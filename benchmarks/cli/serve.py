@@ -22,7 +22,7 @@ from benchmarks.cli.options import (
     option,
     overrides_option,
     port_option,
-    shared,
+    shared_option,
     with_options,
 )
 from benchmarks.terminal import echo, plain
@@ -45,7 +45,7 @@ class ServerOptions(OptionGroup):
         type=click.Choice(ENGINE_CHOICES),
         help="The server program.  [default: chosen by model and machine]",
     )
-    port: int = shared(port_option(8000))
+    port: int = shared_option(port_option(8000))
     name: str = option(default="", help="The model's name in requests.")
     context: int | None = option(
         type=click.IntRange(min=1),
