@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable, Iterator
 
 from benchmarks.cli.live_line import LINE
-from benchmarks.terminal import echo, plain
+from benchmarks.terminal import echo, without_control_codes
 
 Count = Callable[[], str]
 _HEARD = "er_gym.activity"
@@ -31,7 +31,7 @@ def doing(what: str, count: Count | None = None) -> None:
     if not what:
         LINE.end()
     elif _is_terminal():
-        LINE.show(plain(what), count)
+        LINE.show(without_control_codes(what), count)
 
 
 @contextlib.contextmanager

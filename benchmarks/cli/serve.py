@@ -25,7 +25,7 @@ from benchmarks.cli.options import (
     shared_option,
     with_options,
 )
-from benchmarks.terminal import echo, plain
+from benchmarks.terminal import echo, without_control_codes
 
 if TYPE_CHECKING:
     from agents.vlm.serving import Command
@@ -186,7 +186,7 @@ def _wait(server: ServerProcess, command: Command, patience: float, verbose: boo
 
     def hear(since: float, last: str) -> None:
         nonlocal latest
-        latest = plain(last)
+        latest = without_control_codes(last)
 
     if verbose or not sys.stderr.isatty():
         echo(f"starting {command.engine} for {command.name}", err=True)

@@ -305,10 +305,10 @@ def user_turn(
             dialects in which the user tells it. ``now`` is None if nothing was done.
     """
     values = {
-        "task": plain(instruction),
+        "task": without_markup(instruction),
         "actions": texts.list_separator.join(_actions(texts, instruction)),
-        "action": plain(last.action) if last else "",
-        "feedback": plain(last.feedback) if last else "",
+        "action": without_markup(last.action) if last else "",
+        "feedback": without_markup(last.feedback) if last else "",
     }
     if texts.sees == "pictures":
         shown = _shown(pictures)
@@ -407,7 +407,7 @@ def _filled(text: str, values: Mapping[str, str]) -> str:
     return _SLOT.sub(lambda slot: values.get(slot[1], slot[0]), text)
 
 
-def plain(text: str) -> str:
+def without_markup(text: str) -> str:
     """A text from outside without what would be read as a picture, a tag or a special token: these
     get square brackets."""
     return _FORBIDDEN.sub(lambda found: f"[{found[0].strip('<>').strip('|')}]", text)
@@ -440,7 +440,7 @@ def _reply(texts: DialectTexts, trajectory: Trajectory, index: int, seen: str) -
     """What the assistant says at a turn: what it sees, if it tells that, thoughts and decision."""
     turn = trajectory.turns[index]
     decision = f"<DecisionMaking>{turn.action}</DecisionMaking>"
-    thoughts = [(each.kind, plain(each.text).strip()) for each in turn.thoughts]
+    thoughts = [(each.kind, without_markup(each.text).strip()) for each in turn.thoughts]
     if texts.thoughts == "notes" and texts.notes is not None and not _thinks_itself(trajectory):
         thoughts = [note(texts.notes, trajectory, index)]
     if seen:
