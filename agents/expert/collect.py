@@ -361,7 +361,7 @@ class Collector:
         """Look at more candidates, and choose those that a prescreening shows to be fit."""
         rounds = [(stratum, stratum.next()) for stratum in strata if stratum.open]
         fit: dict[str, Candidate] = {}
-        for verdict in prescreen(
+        for prescreened in prescreen(
             [each for _, candidates in rounds for each in candidates],
             env=env,
             seed=self._settings.seed,
@@ -370,10 +370,10 @@ class Collector:
             workers=self._parallelism.workers,
             worker_backend=self._parallelism.worker_backend,
         ):
-            if verdict.reason:
-                self._reject(verdict.reason)
+            if prescreened.reason:
+                self._reject(prescreened.reason)
             else:
-                fit[verdict.candidate.id] = verdict.candidate
+                fit[prescreened.candidate.id] = prescreened.candidate
         for stratum, candidates in rounds:
             stratum.choose([fit[one.id] for one in candidates if one.id in fit])
 

@@ -34,7 +34,7 @@ _MOST_AT_ONCE = 60
 
 
 @dataclass(frozen=True)
-class Verdict:
+class PrescreenResult:
     """What came of a prescreening.
 
     Attributes:
@@ -55,8 +55,8 @@ def prescreen(
     most_actions: int,
     workers: int,
     worker_backend: WorkerBackend = LOCAL_BACKEND,
-) -> Iterator[Verdict]:
-    """Play candidates silently in worker processes; yields the verdicts as they come.
+) -> Iterator[PrescreenResult]:
+    """Play candidates silently in worker processes; yields the results as they come.
 
     Args:
         candidates: of one part.
@@ -77,7 +77,7 @@ def prescreen(
     ) as results:
         for job, result in results:
             if isinstance(result, LostJob):
-                yield from (Verdict(each, "its prescreening crashed") for each in job)
+                yield from (PrescreenResult(each, "its prescreening crashed") for each in job)
             else:
                 yield from result
 
@@ -124,20 +124,20 @@ class _Prescreener:
         self._env = EmbodiedEnv((), **{**env, "obs_mode": SilentAgent.obs_mode})
         self._seed, self._kinds, self._most = seed, kinds, most_actions
 
-    def __call__(self, job: Sequence[Candidate]) -> list[Verdict]:
-        return [self._verdict(each) for each in job]
+    def __call__(self, job: Sequence[Candidate]) -> list[PrescreenResult]:
+        return [self._result(each) for each in job]
 
-    def _verdict(self, candidate: Candidate) -> Verdict:
+    def _result(self, candidate: Candidate) -> PrescreenResult:
         if candidate.actor == "corrector" and candidate.beginning is None:
             beginning = first_mistake(self._play(candidate))
             if beginning.problem:
-                return Verdict(candidate, f"attempt: {beginning.problem}")
+                return PrescreenResult(candidate, f"attempt: {beginning.problem}")
             candidate = replace(
                 candidate, beginning=beginning, run=ATTEMPT, episode=candidate.id, strength=None
             )
         episode = self._play(candidate)
         course = PlayedCourse.of_episode(episode, candidate.kind, candidate.mode)
-        return Verdict(candidate, rejection(course, self._most))
+        return PrescreenResult(candidate, rejection(course, self._most))
 
     def _play(self, candidate: Candidate) -> EpisodeRecord:
         seed = episode_seed(self._seed, candidate.id)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from er_gym.data.mentions import Mention, all_alike
+from er_gym.data.mentions import Mention, all_interchangeable
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.tasks import verbs
@@ -52,7 +52,7 @@ def check_history(thought: Thought) -> Iterator[Refusal]:
 
 
 def _has_done(thought: Thought, verb: str, mention: Mention) -> bool:
-    known, types = thought.known, all_alike(mention.types)
+    known, types = thought.known, all_interchangeable(mention.types)
     if verb == verbs.PICKUP and types & thought.held:
         return True
     if verb == verbs.NAVIGATE and known.at in types:
@@ -201,7 +201,7 @@ def _fits(thought: Thought, decided: Decided) -> bool:
     """Whether an action that a thought decides on is the one that is taken, or begins with it."""
     known = thought.known
     verb, target = known.decision.verb, known.decision.object_type
-    things = all_alike(decided.thing.types) if decided.thing else frozenset()
+    things = all_interchangeable(decided.thing.types) if decided.thing else frozenset()
     same = not decided.thing or target in things
     act = decided.act
     if verb == verbs.OBSERVE:
@@ -240,5 +240,5 @@ def _takes(thought: Thought, things: frozenset[str], verb: str, target: str) -> 
     }
     return verb in (verbs.NAVIGATE, verbs.OPEN) and (
         target in things
-        or bool(all_alike(each for each in holders if each in OBJECT_TYPES) & {target})
+        or bool(all_interchangeable(each for each in holders if each in OBJECT_TYPES) & {target})
     )

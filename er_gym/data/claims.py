@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from er_gym.data.mentions import Mention, all_alike, named_in
+from er_gym.data.mentions import Mention, all_interchangeable, named_in
 from er_gym.data.phrases import MARK, Phrases
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
@@ -152,7 +152,8 @@ def _bears_there(thought: Thought, mention: Mention, clause: Clause, direction: 
     Large furniture is on both sides of the view; its centre is not where a thing on it is.
     """
     return any(
-        each.on in all_alike(mention.types) and direction == (each.side if at == "ahead" else at)
+        each.on in all_interchangeable(mention.types)
+        and direction == (each.side if at == "ahead" else at)
         for other in clause.mentions
         for at, each in thought.things(other.types)
     )
@@ -270,7 +271,7 @@ def _is_placing(clause: Clause, match: re.Match[str], phrases: Phrases) -> bool:
 def _is_given(thought: Thought, mention: Mention) -> bool:
     """Whether the instruction says where the thing is ("that is in the Drawer")."""
     return bool(_GIVEN.search(thought.known.instruction)) and bool(
-        mention.types & all_alike(named_in(thought.known.instruction))
+        mention.types & all_interchangeable(named_in(thought.known.instruction))
     )
 
 
@@ -314,7 +315,7 @@ def _holders(thought: Thought, each: SeenObject, view: Sequence[SeenObject]) -> 
             found.add(holder)
             found |= PARTS.get(holder, frozenset())
             upwards += [other.on for other in view if other.type == holder]
-    return {*all_alike(each for each in found if each in OBJECT_TYPES)}
+    return {*all_interchangeable(each for each in found if each in OBJECT_TYPES)}
 
 
 def _not_on(thought: Thought, mention: Mention, holder: Mention) -> str:
