@@ -132,7 +132,7 @@ class ExecutorOptions(OptionGroup):
                 shared_files=self.shared_dir,
             )
         with entered(lambda: ray_backend(settings, say, modules_of(agents))) as worker_backend:
-            yield Workforce(worker_backend, self.workers or worker_backend.places)
+            yield Workforce(worker_backend, self.workers or worker_backend.capacity)
 
 
 def with_executor_options(

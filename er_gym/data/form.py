@@ -29,7 +29,7 @@ _FEW_FOREIGN = 3
 """So many different words of another language are no coincidence."""
 
 
-def words(text: str) -> int:
+def thought_length(text: str) -> int:
     """The length of a thought in words; in Chinese, two characters count as one, rounded up."""
     han = len(_HAN.findall(text))
     return (han + 1) // 2 + len(_HAN.sub(" ", text).split()) - _lonely(text)
@@ -42,7 +42,7 @@ def _lonely(text: str) -> int:
 
 def check_length(thought: Thought) -> Iterator[Refusal]:
     """Empty, shorter than three words, or over the limit."""
-    count = words(thought.text)
+    count = thought_length(thought.text)
     if not thought.text.strip():
         yield Refusal("length", "The thought is empty; write a sentence.")
     elif count < _FEWEST:

@@ -42,7 +42,7 @@ class RayBackend:
         return self.is_local or self.settings.shared_files
 
     @property
-    def places(self) -> int:
+    def capacity(self) -> int:
         """How many workers the cluster's present nodes have processors for, at least 1."""
         has: dict[str, float] = ray.cluster_resources()  # type: ignore[no-untyped-call]
         return max(1, math.floor(has.get("CPU", 0) / (self.settings.cpus or 1) + 1e-6))
