@@ -34,7 +34,7 @@ MAY_USE = {
     "agents/vlm": ("vlm",),
     "agents/vlm/clients/adapters.py": ("local",),
     "agents/vlm/clients/checkpoint.py": ("local",),
-    "agents/vlm/clients/kept_turns.py": ("local",),
+    "agents/vlm/clients/kv_cache.py": ("local",),
     "agents/vlm/clients/local.py": ("local",),
     "agents/vlm/clients/merging.py": ("local",),
     "agents/vlm/clients/model_actors.py": ("local", "ray"),

@@ -108,7 +108,7 @@ class Score:
 
     Attributes:
         task_id, task_type, group: what was played.
-        success: the counts'; also where the paper's program gives more than 1, as it does in a task
+        success: as counted; also where the paper's program gives more than 1, as it does in a task
             whose only other key action was done and that does not ask for ``end``.
         missing: the scoring key actions that were not done, as ``"verb Type"``.
         sample: which of the task's episodes it is, from 1.
