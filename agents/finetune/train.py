@@ -23,7 +23,7 @@ from transformers.trainer_utils import set_seed
 
 import er_gym
 from agents.finetune import machine
-from agents.finetune.batches import Collator, EncodedChats, Order
+from agents.finetune.batches import Collator, EncodedChats, EpochSampler
 from agents.finetune.feedback import FEEDBACK, add_feedback, add_rows, needs_feedback
 from agents.finetune.libraries import flush_denormals, quiet_libraries
 from agents.finetune.loop import FinetuneTrainer, Progress, TrainingLog, is_sharded
@@ -212,7 +212,7 @@ def _train(
     trainer = FinetuneTrainer(
         network,
         arguments,
-        Order(
+        EpochSampler(
             [chat.length for chat in chats],
             settings.training.batch,
             settings.training.seed,
