@@ -28,12 +28,12 @@ from agents.configs import dump
 from agents.rl import dqn, policy
 from agents.rl.callbacks import (
     CURVE,
-    BoardWriter,
     Checkpoints,
     Curriculum,
     CurveWriter,
     HeldOutEvaluation,
     SuccessByType,
+    TensorBoardWriter,
     TorchThreads,
     TrackerWriter,
     evaluated_at,
@@ -233,7 +233,7 @@ def _logger(config: TrainConfig, run: Path, steps: int | None) -> Logger:
     """What is logged, rewound to the checkpoint of ``steps`` from which the run goes on."""
     writers: list[KVWriter] = [CurveWriter(run, steps)]
     if config.tensorboard:
-        writers.append(BoardWriter(run / TENSORBOARD, steps))
+        writers.append(TensorBoardWriter(run / TENSORBOARD, steps))
     if config.wandb:
         writers.append(_wandb_writer(config, run))
     return Logger(str(run), writers)
