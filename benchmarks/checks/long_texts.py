@@ -161,8 +161,8 @@ def readers() -> Mapping[str, Reader]:
     from agents.vlm.matching import Matcher
     from agents.vlm.parsing import parse
     from agents.vlm.redaction import Secrets
+    from agents.vlm.reply_causes import causes_of
     from agents.vlm.settings import Matching
-    from agents.vlm.shortcomings import causes_of
     from benchmarks.monitor.formats import brief, visible
     from er_gym.data.critic import LONGEST_WORD, check
     from er_gym.data.knowledge import Knowledge
