@@ -27,7 +27,13 @@ from agents.finetune.batches import Collator, EncodedChats, EpochSampler
 from agents.finetune.feedback import FEEDBACK, add_feedback, add_rows, needs_feedback
 from agents.finetune.libraries import flush_denormals, quiet_libraries
 from agents.finetune.loop import FinetuneTrainer, Progress, TrainingLog, is_sharded
-from agents.finetune.memory import Memory, Plan, memory, numbers_of, size
+from agents.finetune.memory import (
+    MemoryEstimate,
+    TuningSetup,
+    bytes_text,
+    dimensions_of,
+    estimate_memory,
+)
 from agents.finetune.model_files import (
     History,
     ModelFiles,
@@ -179,7 +185,7 @@ def _train(
     free = machine.free_memory()
     if needed.total > free and not ignore_memory:
         raise ValueError(
-            f"this would take about {needed}, and {size(free)} of "
+            f"this would take about {needed}, and {bytes_text(free)} of "
             f"{'GPU memory' if machine.on_gpu() else 'memory'} are free; set a lower "
             "training.batch, training.checkpointing=true, model.lora.rank=8 or a lower "
             "data.max_pixels, take a smaller model, or give --ignore-memory"
@@ -316,9 +322,9 @@ def _optimizer(network: Any, settings: FinetuneSettings) -> MuonAdamW | None:
 
 def _memory(
     settings: FinetuneSettings, files: ModelFiles, chats: list[EncodedChat], dtype: str, gpus: int
-) -> Memory:
+) -> MemoryEstimate:
     merge = files.image_processor.merge_size**2 if files.has_vision else 1
-    plan = Plan(
+    plan = TuningSetup(
         precision="bfloat16" if dtype == "bfloat16" else "float32",
         lora_rank=settings.model.lora.rank if settings.model.lora else None,
         freeze=settings.model.freeze,
@@ -330,7 +336,7 @@ def _memory(
         gpus=gpus if settings.training.deepspeed or settings.training.fsdp else 1,
         on_gpu=machine.on_gpu(),
     )
-    return memory(numbers_of(files.config.to_dict()), plan)
+    return estimate_memory(dimensions_of(files.config.to_dict()), plan)
 
 
 def _about(chats: list[EncodedChat], samples: Samples) -> str:

@@ -5,7 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from agents.finetune.launchers.plan import LaunchPlan
-from agents.finetune.memory import GIB, Memory, ModelNumbers, Plan, memory
+from agents.finetune.memory import (
+    GIB,
+    MemoryEstimate,
+    ModelDimensions,
+    TuningSetup,
+    estimate_memory,
+)
 from agents.finetune.models import load_facts, model_names
 from agents.finetune.settings import FinetuneSettings, Lora
 from er_gym.tables import Table
@@ -17,14 +23,14 @@ PARTS = ("weights", "gradients", "optimizer", "activations", "logits", "overhead
 
 
 def expected(
-    numbers: ModelNumbers,
+    numbers: ModelDimensions,
     settings: FinetuneSettings,
     *,
     tokens: int,
     picture_tokens: int,
     gpus: int,
     new_tokens: bool = False,
-) -> Memory:
+) -> MemoryEstimate:
     """The memory on one GPU.
 
     Args:
@@ -36,7 +42,7 @@ def expected(
             token is new.
     """
     lora = settings.model.lora
-    plan = Plan(
+    plan = TuningSetup(
         precision="float32" if settings.model.dtype == "float32" else "bfloat16",
         lora_rank=lora.rank if lora else None,
         freeze=settings.model.freeze,
@@ -47,7 +53,7 @@ def expected(
         patches=picture_tokens * _PATCHES_A_TOKEN,
         gpus=1 if lora else gpus,
     )
-    found = memory(numbers, plan)
+    found = estimate_memory(numbers, plan)
     if lora is None or not new_tokens:
         return found
     more = numbers.embeddings
