@@ -24,7 +24,7 @@ from functools import lru_cache
 from types import FrameType
 from typing import Any
 
-from benchmarks.harness.tally import Tally, Try, holds, run_check, tally
+from benchmarks.harness.tally import Tally, Try, has_words, run_check, tally
 
 LONG = 100_000
 _SHORT = 1_500
@@ -326,7 +326,7 @@ def check(words: Sequence[str] = (), *, framed: bool = True) -> Tally:
 
 def _tries(words: Sequence[str], framed: bool) -> Iterator[Try]:
     for reader, read in readers().items():
-        if holds(reader, words):
+        if has_words(reader, words):
             read("Put the Apple into the Fridge.")  # what is loaded once is loaded now
             grows = () if reader in BOUNDED else growing(read, framed=framed)
             for name, problems in (*grows, *slow(read, framed=framed)):

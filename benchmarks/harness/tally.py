@@ -55,7 +55,7 @@ def tally(what: str, tries: Iterable[Try], say: Callable[[str], None] = click.ec
     return Tally(what, tried, failed, time.monotonic() - began)
 
 
-def holds(text: str, words: Sequence[str]) -> bool:
+def has_words(text: str, words: Sequence[str]) -> bool:
     """Whether a name has all words that were given to choose by."""
     return all(word in text for word in words)
 

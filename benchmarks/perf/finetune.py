@@ -27,7 +27,7 @@ import transformers
 from torch.profiler import ProfilerActivity, profile
 
 from agents.finetune.architecture import Architecture
-from agents.finetune.batches import Order
+from agents.finetune.batches import EpochSampler
 from agents.finetune.memory import ModelDimensions, dimensions_of
 from agents.finetune.new_model import make_model
 from agents.finetune.samples import open_samples
@@ -184,7 +184,7 @@ def main(
         every = [one_round() for _ in range(rounds)]
         with profile(activities=[ProfilerActivity.CPU]) as seen:
             learn(epochs)
-    order = list(Order([chat.length for chat in chats], batch, 0, buckets=True))
+    order = list(EpochSampler([chat.length for chat in chats], batch, 0, buckets=True))
     batches = [
         [chats[i].length for i in order[at : at + batch]] for at in range(0, len(order), batch)
     ]

@@ -100,7 +100,7 @@ class Result:
         """As a chart shows it."""
         return Shown(self.name, self.of.faults, self.summary["success"], [*self.by_seed.values()])
 
-    def told(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """All figures, as fractions with their intervals."""
         return {
             "name": self.name,

@@ -24,7 +24,7 @@ from benchmarks.harness.chat_server import (
 from benchmarks.harness.measuring import in_turns, per_second, timed
 from benchmarks.harness.output import json_option, print_table, write_figures
 from benchmarks.harness.processes import plain_environment, run
-from benchmarks.harness.tally import Tally, end, holds, tally
+from benchmarks.harness.tally import Tally, end, has_words, tally
 from er_gym.tasks.suites import load_suite
 
 # -- tries -----------------------------------------------------------------------------------------
@@ -48,8 +48,8 @@ def test_a_failure_is_the_exit_code(failed, code):
 
 
 def test_tries_are_chosen_by_all_words():
-    assert holds("a server that hangs", ["server", "hangs"])
-    assert not holds("a server that hangs", ["server", "lies"])
+    assert has_words("a server that hangs", ["server", "hangs"])
+    assert not has_words("a server that hangs", ["server", "lies"])
 
 
 # -- measuring and printing ------------------------------------------------------------------------
