@@ -48,9 +48,8 @@ def fork_workers(modules: tuple[str, ...] = _MODULES) -> None:
 
 
 if __name__ == "__main__":
-    from benchmarks.plan import run
-
     from benchmarks.cli.main import main
+    from benchmarks.study import run
 
     fork_workers(_MODULES_OF_PHASES)
     run.CONTEXT = FORKED  # type: ignore[assignment]

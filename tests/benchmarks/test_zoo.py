@@ -14,8 +14,9 @@ pytest.importorskip("sb3_contrib", reason="needs the extra rl")
 from episodes_by_hand import make_episode
 from untrained_policy import write_untrained_run
 
+from agents import packing
 from agents.rl.config import config_file, load_config
-from agents.zoo import index, packing
+from agents.zoo import index
 from agents.zoo.card import Card, read_card
 from benchmarks.cli.zoo import DTYPES
 from er_gym.rollout.events import EventLog, RunBegun
