@@ -39,7 +39,7 @@ from agents.zoo.index import PREFIX as ZOO_PREFIX
 from agents.zoo.index import resolved
 from er_gym.activity import begin_import
 from er_gym.extras import MissingPackage
-from er_gym.plugins import PluginError, Registry, reason
+from er_gym.plugins import PluginError, Registry, error_line
 from er_gym.rollout.agent import Agent, Decision, MakeAgent
 from er_gym.tasks.task import Task
 
@@ -93,8 +93,8 @@ def make_agent(name: str, seed: int = 0) -> Agent:
         agent = _construct(make, seed)
     except (Exception, SystemExit) as error:  # another package's code can raise anything
         raise PluginError(
-            f"agent {name!r} cannot be made ({reason(error)}); it is called with seed= if it takes "
-            "that, else without arguments"
+            f"agent {name!r} cannot be made ({error_line(error)}); it is called with seed= if it "
+            "takes that, else without arguments"
         ) from error
     parts: dict[str, Any] = {"obs_mode": str, "reset": Callable, "act": Callable}
     lacking = [

@@ -23,14 +23,14 @@ _UNSEEN = re.compile(
 )
 
 
-def plain(text: str) -> str:
+def without_control_codes(text: str) -> str:
     r"""Text without terminal control codes: ``\x1b`` in place of the escape character."""
     return _UNSEEN.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 def echo(message: object = "", *, nl: bool = True, err: bool = False) -> None:
     """Print text, on stderr with ``err``, with a newline at its end with ``nl``."""
-    click.echo(plain(str(message)), nl=nl, err=err)
+    click.echo(without_control_codes(str(message)), nl=nl, err=err)
 
 
 def use_any_encoding() -> None:
@@ -53,7 +53,7 @@ def terminal(*, stderr: bool = False, width: int | None = None) -> Console:
                 if segment.control:  # Rich's own
                     yield segment
                 else:
-                    yield Segment(plain(segment.text), segment.style)
+                    yield Segment(without_control_codes(segment.text), segment.style)
 
     return Terminal(stderr=stderr, width=width, markup=False, emoji=False, highlight=False)
 

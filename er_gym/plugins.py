@@ -8,8 +8,8 @@ There are two ways to name a plugin:
 
 A :class:`Registry` looks a name up among er-gym's own objects, then in both of these ways.
 Tables that are complete before anything is looked up (task types, verbs, actions and shapes) take
-everything that :func:`added` finds: what installed packages declare, and what the environment
-variable ``ER_GYM_PLUGINS`` names, such as ``verbs=household.verbs:CLEAN``.
+everything that :func:`added_objects` finds: what installed packages declare, and what the
+environment variable ``ER_GYM_PLUGINS`` names, such as ``verbs=household.verbs:CLEAN``.
 ``docs/extending.md`` has a walk-through for each registry.
 """
 
@@ -151,11 +151,11 @@ def load_entry_point(entry: metadata.EntryPoint, kind: str) -> Any:
     except (Exception, SystemExit) as error:  # a module can raise anything
         raise PluginError(
             f"{kind} {entry.name!r} of the package {_package(entry)} cannot be loaded from "
-            f"{entry.value} ({reason(error)}); mend or uninstall that package"
+            f"{entry.value} ({error_line(error)}); mend or uninstall that package"
         ) from error
 
 
-def added(
+def added_objects(
     kind: str, table: str, expected: str, *, registers: bool = False
 ) -> Iterator[tuple[Any, str]]:
     """The rows of a table that :data:`VARIABLE` names and installed packages declare.
@@ -233,8 +233,8 @@ def _loaded(name: str, kind: str, expected: str) -> Any:
         found: Any = _imported(module_name)
     except (Exception, SystemExit) as error:  # a module can raise anything
         raise PluginError(
-            f"Cannot import {module_name!r} of {kind} {name!r} ({reason(error)}); give {expected}, "
-            "in an installed package, the working directory or a folder on PYTHONPATH"
+            f"Cannot import {module_name!r} of {kind} {name!r} ({error_line(error)}); give "
+            f"{expected}, in an installed package, the working directory or a folder on PYTHONPATH"
         ) from error
     for attribute in attributes.split("."):
         if not hasattr(found, attribute):
@@ -267,7 +267,7 @@ def _package(entry: metadata.EntryPoint) -> str:
     return entry.dist.name if entry.dist else "unknown"
 
 
-def reason(error: BaseException) -> str:
+def error_line(error: BaseException) -> str:
     """The type and the first line of an exception."""
     first_line = (str(error).strip().splitlines() or [""])[0]
     return f"{type(error).__name__}: {first_line}"

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from agents.expert.acceptance import PlayedCourse, rejection
-from agents.expert.audition import SilentAgent
 from agents.expert.candidates import Candidate, CandidateSequence
 from agents.expert.course import Course, Intent, View
+from agents.expert.prescreen import SilentAgent
 from agents.expert.recipe import Part
 from agents.expert.thought_kinds import load_thought_kinds
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -80,7 +80,7 @@ def environment(**more: object) -> EmbodiedEnv:
 
 
 def play(env: EmbodiedEnv, candidate: Candidate) -> Played:
-    """Play a candidate as an audition does."""
+    """Play a candidate as a prescreening does."""
     seed = episode_seed(SEED, candidate.id)
     course = NotedCourse(candidate.course(seed, KINDS))
     episode = play_episode(env, SilentAgent(course), candidate.played_task, seed)

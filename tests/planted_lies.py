@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from lie_wordings import HONEST_EN, HONEST_ZH, LIES_EN, LIES_ZH
 
 from er_gym.data.knowledge import Knowledge
-from er_gym.data.mentions import alike, all_alike, named_in
+from er_gym.data.mentions import all_interchangeable, interchangeable, named_in
 from er_gym.data.names_zh import NAMES_ZH
 from er_gym.data.trajectory import SeenObject
 from er_gym.envs.actions import Action
@@ -83,8 +83,10 @@ class _Scene:
         self.english = knowledge.language == "en"
         self.views = {"ahead": knowledge.view, **knowledge.views}
         self.types = sorted(knowledge.in_view)
-        self.seen = all_alike({*knowledge.seen, *knowledge.in_view, knowledge.held} - {""})
-        self.named = all_alike(named_in(knowledge.instruction))
+        self.seen = all_interchangeable(
+            {*knowledge.seen, *knowledge.in_view, knowledge.held} - {""}
+        )
+        self.named = all_interchangeable(named_in(knowledge.instruction))
 
     def name(self, object_type: str) -> str:
         """A name of a type that no other type bears: spelled, in words, or in Chinese."""
@@ -94,7 +96,7 @@ class _Scene:
         return self.draw.choice((object_type, NAMES_ZH[object_type][0]))
 
     def places(self, object_type: str) -> set[str]:
-        wanted = alike(object_type)
+        wanted = interchangeable(object_type)
         return {
             each.side if view == "ahead" else view
             for view, things in self.views.items()
@@ -123,7 +125,7 @@ class _Scene:
                 getattr(other, attribute)
                 for view in self.views.values()
                 for other in view
-                if other.type in alike(each.type)
+                if other.type in interchangeable(each.type)
             ]
             if None not in things and len({*things}) == 1:
                 found.append(each)
@@ -133,12 +135,14 @@ class _Scene:
         """A value for each slot; those that the scene does not offer are left out."""
         known, draw = self.known, self.draw
         found: dict[str, str] = {"near": self.pick(self.types)}
-        unknown = [each for each in OBJECT_TYPES if not alike(each) & (self.seen | self.named)]
+        unknown = [
+            each for each in OBJECT_TYPES if not interchangeable(each) & (self.seen | self.named)
+        ]
         offered = {*known.navigable, *known.plan, known.subgoal.thing, known.subgoal.place}
         strange = [each for each in unknown if each not in offered and each not in _GENERAL]
         found["unseen"] = self.pick(strange)
         thing = known.subgoal.thing
-        if thing and not alike(thing) & self.seen:
+        if thing and not interchangeable(thing) & self.seen:
             found["sought"] = thing
         opened = {each.action.object_type for each in known.actions if each.success}
         shut = {each.type for each in self.alone("open") if each.open is False}
@@ -152,11 +156,13 @@ class _Scene:
             found["thing"] = one
             found["side"], found["right_side"] = self.side(draw.choice(wrong)), self.side(place)
         gone = {each.object_type for each in (a.action for a in known.actions)} | {known.at}
-        never = [each for each in self.types if not all_alike([each]) & gone - {""}]
+        never = [each for each in self.types if not all_interchangeable([each]) & gone - {""}]
         far = [each for each in never if "openable" in OBJECT_TYPES[each].properties]
         found["unvisited"] = self.pick([each for each in far if each not in _DOORS])
         take = [each for each in self.types if "pickupable" in OBJECT_TYPES[each].properties]
-        found["free"] = self.pick([each for each in take if each not in alike(known.held)])
+        found["free"] = self.pick(
+            [each for each in take if each not in interchangeable(known.held)]
+        )
         found["held"] = known.held
         attribute = draw.choice(("open", "toggled"))
         stateful = self.alone(attribute)
@@ -180,7 +186,7 @@ class _Scene:
                 other
                 for view in self.views.values()
                 for other in view
-                if other.type in alike(each.type)
+                if other.type in interchangeable(each.type)
             ]
             if (
                 len(same) != 1
@@ -197,7 +203,7 @@ class _Scene:
             ]
             simple = not any(other.on for other in self.known.view if other.type == each.on)
             if simple and each.on not in _PARTS:
-                others = [one for one in holders if one not in all_alike([each.on])]
+                others = [one for one in holders if one not in all_interchangeable([each.on])]
                 found.append((each.type, each.on, others))
         return found
 
@@ -251,7 +257,7 @@ def fill(template: str, sort: str, scene: _Scene) -> str | None:
     if not all(values.get(each) for each in wanted):
         return None
     names = [values[each] for each in wanted if each in _NAMES]
-    if any(alike(a) & alike(b) for a, b in itertools.combinations(names, 2)):
+    if any(interchangeable(a) & interchangeable(b) for a, b in itertools.combinations(names, 2)):
         return None
     shown = {each: scene.name(values[each]) if each in _NAMES else values[each] for each in wanted}
     return _capital(template.format(**shown))
@@ -268,13 +274,13 @@ def _other_act(scene: _Scene) -> str:
     types = [
         each
         for each in scene.types
-        if each not in all_alike([known.decision.object_type or "Floor"])
+        if each not in all_interchangeable([known.decision.object_type or "Floor"])
     ]
     lies_on = {
         each.type
         for view in scene.views.values()
         for each in view
-        if each.on in alike(known.decision.object_type or "Floor")
+        if each.on in interchangeable(known.decision.object_type or "Floor")
     }
     act = scene.draw.choice((verbs.NAVIGATE, verbs.OPEN, verbs.PICKUP))
     takes = [
@@ -282,7 +288,7 @@ def _other_act(scene: _Scene) -> str:
         for each in types
         if each not in lies_on
         and (act == verbs.NAVIGATE or verbs.verb_named(act).takes(each))
-        and known.seen.get(each) not in alike(known.decision.object_type or "Floor")
+        and known.seen.get(each) not in interchangeable(known.decision.object_type or "Floor")
     ]
     return scene.act(Action(act, scene.pick(takes))) if takes else ""
 

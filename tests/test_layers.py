@@ -44,7 +44,7 @@ _OF_AGENTS = {
         *("agents.scripted.searcher", "agents.vlm"),
     },
     "agents.finetune": {"agents.configs", "agents.vlm", "agents.vlm.clients"},
-    "agents.finetune.printing": {"agents.configs", "agents.finetune"},
+    "agents.finetune.launchers": {"agents.configs", "agents.finetune"},
 }
 """The folders of ``agents`` to the other ones that they may import, besides what is below
 ``agents``; ``agents`` alone is its own top-level modules."""
@@ -76,7 +76,7 @@ ALLOWED = {
     "benchmarks.scoring": _SCORING,
     "benchmarks.terminal": {*_ENVS, "benchmarks.terminal"},
     "benchmarks.study": _STUDY,
-    "benchmarks.eyes": {*_COMMAND, "benchmarks.eyes"},
+    "benchmarks.vision_probe": {*_COMMAND, "benchmarks.vision_probe"},
     "benchmarks.vlm_run": _AGENTS,
     "benchmarks.monitor": _MONITOR,
     "benchmarks.cli": _COMMAND,

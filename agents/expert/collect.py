@@ -8,16 +8,16 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from agents.expert.audition import audition
 from agents.expert.candidates import (
     Candidate,
     Candidates,
     CandidateSequence,
     FixedCandidates,
 )
-from agents.expert.corrections import CorrectAfter, CorrectBy, beginnings_of
+from agents.expert.corrections import CorrectAfter, CorrectBy, correction_points
 from agents.expert.explorer import Strength
 from agents.expert.players import Players, PlaySettings
+from agents.expert.prescreen import prescreen
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
 from er_gym.data.collection import Collection, CollectionError
 from er_gym.data.trajectory import Trajectory
@@ -210,7 +210,7 @@ def correction_strata(
     begun: set[tuple[str, tuple[Action, ...]]] = set()
     for episode in run_directory.episodes():
         task = by_id.get(episode.task_id)
-        for beginning in beginnings_of(episode, after):
+        for beginning in correction_points(episode, after):
             problem = beginning.problem if task else "its task is not among the suite's"
             if not problem and (episode.task_id, beginning.actions) in begun:
                 problem = "another sample of its task begins alike"
@@ -358,22 +358,22 @@ class Collector:
             self._choose(strata, env, most)
 
     def _choose(self, strata: Sequence[Stratum], env: Mapping[str, Any], most: int) -> None:
-        """Look at more candidates, and choose those that an audition shows to be fit."""
+        """Look at more candidates, and choose those that a prescreening shows to be fit."""
         rounds = [(stratum, stratum.next()) for stratum in strata if stratum.open]
         fit: dict[str, Candidate] = {}
-        for verdict in audition(
+        for prescreened in prescreen(
             [each for _, candidates in rounds for each in candidates],
             env=env,
             seed=self._settings.seed,
             kinds=self._settings.play.kinds,
             most_actions=most,
             workers=self._parallelism.workers,
-            machines=self._parallelism.machines,
+            worker_backend=self._parallelism.worker_backend,
         ):
-            if verdict.reason:
-                self._reject(verdict.reason)
+            if prescreened.reason:
+                self._reject(prescreened.reason)
             else:
-                fit[verdict.candidate.id] = verdict.candidate
+                fit[prescreened.candidate.id] = prescreened.candidate
         for stratum, candidates in rounds:
             stratum.choose([fit[one.id] for one in candidates if one.id in fit])
 

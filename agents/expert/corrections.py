@@ -48,10 +48,10 @@ class Beginning:
         return len(self.actions) - 1
 
 
-def beginnings_of(episode: EpisodeRecord, after: CorrectAfter = "wrong") -> list[Beginning]:
+def correction_points(episode: EpisodeRecord, after: CorrectAfter = "wrong") -> list[Beginning]:
     """The beginnings of a failed episode that are corrected; one that has a ``problem`` if none."""
     if after != "anywhere" or episode.success or episode.error:
-        return [beginning_of(episode, "wrong" if after == "anywhere" else after)]
+        return [first_mistake(episode, "wrong" if after == "anywhere" else after)]
     steps = episode.steps[1:]
     end = len(steps) - 1 if episode.end_reason == REPEATED else len(steps)
     end = min(end, episode.max_steps - ROOM - 1)  # placing the agent was a step, too
@@ -65,7 +65,9 @@ def beginnings_of(episode: EpisodeRecord, after: CorrectAfter = "wrong") -> list
     return [_until(steps, place) for place in sorted(drawn[:DRAWS])]
 
 
-def beginning_of(episode: EpisodeRecord, after: Literal["wrong", "failure"] = "wrong") -> Beginning:
+def first_mistake(
+    episode: EpisodeRecord, after: Literal["wrong", "failure"] = "wrong"
+) -> Beginning:
     """The actions of a failed episode up to the one that is corrected."""
     if episode.success:
         return Beginning(problem="the episode succeeded")

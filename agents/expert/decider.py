@@ -11,15 +11,15 @@ from agents.expert.candidates import Candidate, Candidates
 from agents.expert.course import Intent, View
 from agents.expert.explorer import Strength
 from agents.expert.legs import at_hand, legs_of
-from agents.expert.own_words import KIND_OF_TAG
 from agents.expert.players import PlaySettings, header_of
 from agents.expert.recipe import Part, Recipe
+from agents.expert.recorded_replies import KIND_OF_TAG
 from agents.expert.recorder import (
     FOLDERS,
     OBS_MODE,
     TrajectoryHeader,
     TrajectoryRecorder,
-    spoken,
+    thoughts_text,
 )
 from agents.expert.replayed_intents import replayed_purpose
 from agents.expert.writers.prompts import WriterPrompts
@@ -102,7 +102,9 @@ class DecidingAgent:
         )
         if decision.reply is not None:
             recorder.pay([decision.reply])
-        return Decision(decision.action, spoken(thoughts), decision.reply, causes=decision.causes)
+        return Decision(
+            decision.action, thoughts_text(thoughts), decision.reply, causes=decision.causes
+        )
 
     def attachments(self, episode: EpisodeRecord, stem: str) -> dict[str, bytes]:
         """The pictures and the trajectory, by path; empty if the episode crashed."""

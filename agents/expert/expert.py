@@ -9,8 +9,8 @@ from agents.expert.legs import Leg
 from agents.expert.places import (
     DrawnPlaces,
     PlaceChooser,
-    candidates,
     draw_places,
+    likely_places,
     plan_of,
 )
 from agents.expert.replayed_intents import replayed_intent
@@ -118,7 +118,7 @@ class ExpertCourse(TaskCourse):
             wrong = len(self._mode) - 1
             index = self._random.randint(0, wrong)
             mode = "0" * index + "1" + "0" * (wrong - index)
-        plausible = candidates(leg.thing, self.view.navigable, without=[leg.place])
+        plausible = likely_places(leg.thing, self.view.navigable, without=[leg.place])
         wrong_places = self._places.choose(leg.thing, plausible, mode.count("0"), self._random)
         return plan_of(mode, leg.place, wrong_places)
 
@@ -129,7 +129,7 @@ class ExpertCourse(TaskCourse):
         yield from self._look_around()
         if self._known(leg.place):
             return True
-        others = candidates(leg.thing, self.view.navigable, without=[leg.place, *visited])
+        others = likely_places(leg.thing, self.view.navigable, without=[leg.place, *visited])
         for place in draw_places(others, 1, self._random, temperature=0.0):
             yield from self._visit(place, leg, (place,))
             if not self._known(leg.place):

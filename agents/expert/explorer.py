@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from agents.expert.course import Intent
 from agents.expert.legs import Leg
-from agents.expert.places import candidates, draw_places
+from agents.expert.places import draw_places, likely_places
 from agents.expert.task_course import GiveUp, Intents, TaskCourse
 from agents.expert.thought_kinds import Check
 from er_gym.envs.actions import Action
@@ -102,7 +102,7 @@ class ExplorerCourse(TaskCourse):
 
     def _stray(self, leg: Leg) -> Intents:
         """Go to an unlikely place, and with some probability give up the episode there."""
-        weighted = [(place, 1.0) for place, _ in candidates(leg.thing, self.view.navigable)]
+        weighted = [(place, 1.0) for place, _ in likely_places(leg.thing, self.view.navigable)]
         for place in draw_places(weighted, 1, self._random):
             yield from self._visit(place, leg, (place,))
         if not leg.actions or self._random.random() < _LOSES_HEART:
@@ -146,7 +146,7 @@ class ExplorerCourse(TaskCourse):
         return [*self._ahead(), *(view for each in around.values() for view in each)]
 
     def _next_places(self, leg: Leg, tried: list[str]) -> list[str]:
-        weighted = candidates(leg.thing, self.view.navigable, without=tried)
+        weighted = likely_places(leg.thing, self.view.navigable, without=tried)
         return draw_places(weighted, _SHOWN, self._random, self._strength.temperature)
 
     def _do_key(self, key: KeyAction, leg: Leg) -> Intents:

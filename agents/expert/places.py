@@ -19,7 +19,7 @@ _ONLY_FOR_SMALL = frozenset({"GarbageCan", "LaundryHamper", "Box", "Toilet", "To
 """Receptacles in or on which no fixed object stands."""
 
 
-def candidates(
+def likely_places(
     thing: str, navigable: Iterable[str], without: Iterable[str] = ()
 ) -> list[tuple[str, float]]:
     """The places where a person would search for an object, each with a weight.

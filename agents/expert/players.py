@@ -49,8 +49,8 @@ class Players(Protocol):
 
     @property
     def scripted(self) -> bool:
-        """Whether the agents do what the candidates' courses decide, so that an audition shows the
-        results of their episodes."""
+        """Whether the agents do what the candidates' courses decide, so that a prescreening shows
+        the results of their episodes."""
 
     def make(
         self, candidates: Mapping[str, Candidate], settings: PlaySettings, most_actions: int

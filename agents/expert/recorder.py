@@ -210,7 +210,7 @@ class TrajectoryRecorder:
 
     def _trajectory(self, episode: EpisodeRecord) -> Trajectory:
         task, header = self._task, self._header
-        turns = learnt_after_fault(with_results(self.turns, self._faults, episode))
+        turns = train_after_fault(with_results(self.turns, self._faults, episode))
         if not self._learn_failures:
             turns = [
                 turn.model_copy(update={"train": turn.train and turn.success}) for turn in turns
@@ -265,7 +265,7 @@ class TrajectoryRecorder:
         )
 
 
-def learnt_after_fault(turns: list[Turn]) -> list[Turn]:
+def train_after_fault(turns: list[Turn]) -> list[Turn]:
     """Turns of which nothing is learnt up to the first fault or mistake, that turn included.
 
     As in the paper's third stage (arXiv 2503.21696), the reflection on a fault and what follows it
@@ -280,7 +280,7 @@ def learnt_after_fault(turns: list[Turn]) -> list[Turn]:
     ]
 
 
-def bill_of(replies: Sequence[ModelReply]) -> ModelReply | None:
+def total_reply(replies: Sequence[ModelReply]) -> ModelReply | None:
     """The sum of a turn's replies, as a decision states it; None for none."""
     if not replies:
         return None
@@ -294,7 +294,7 @@ def bill_of(replies: Sequence[ModelReply]) -> ModelReply | None:
     )
 
 
-def spoken(thoughts: Iterable[ThoughtRecord]) -> str:
+def thoughts_text(thoughts: Iterable[ThoughtRecord]) -> str:
     """A turn's thoughts as one text."""
     return "\n".join(thought.text for thought in thoughts)
 

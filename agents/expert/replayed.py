@@ -13,14 +13,14 @@ from agents.expert.acceptance import steps_of
 from agents.expert.candidates import Candidate
 from agents.expert.course import Intent, View
 from agents.expert.legs import legs_of
-from agents.expert.own_words import OwnWords, own_words
 from agents.expert.players import PlaySettings, header_of
+from agents.expert.recorded_replies import RecordedReplies, recorded_replies
 from agents.expert.recorder import (
     FOLDERS,
     OBS_MODE,
     TrajectoryHeader,
     TrajectoryRecorder,
-    spoken,
+    thoughts_text,
 )
 from agents.expert.replayed_intents import replayed_intent
 from agents.expert.thinker import ThinkingAgent
@@ -88,7 +88,7 @@ class QuotingAgent:
     def __init__(
         self,
         course: ReplayedCourse,
-        words: OwnWords,
+        words: RecordedReplies,
         name: str,
         header: TrajectoryHeader,
         settings: PlaySettings,
@@ -122,7 +122,7 @@ class QuotingAgent:
         recorder.pay([said.reply])
         limits = self._settings.kinds.limits["alone"]
         thoughts = recorder.think_own(now, said.thoughts, self._name, limits)
-        return Decision(intent.action, spoken(thoughts))
+        return Decision(intent.action, thoughts_text(thoughts))
 
     def attachments(self, episode: EpisodeRecord, stem: str) -> dict[str, bytes]:
         """The pictures and the trajectory, by path; empty if the episode crashed."""
@@ -163,7 +163,7 @@ class Replayers:
         rejects = partial(replay_rejection, episode=episode, strict=self.strict)
         header = header_of(candidate, settings)
         course = ReplayedCourse(task, steps_of(episode))
-        words = None if self.rewrite else own_words(run.path, episode)
+        words = None if self.rewrite else recorded_replies(run.path, episode)
         if words is None or words.silent:
             return ThinkingAgent(
                 course,

@@ -18,8 +18,8 @@ from agents.expert.acceptance import steps_of
 from agents.expert.candidates import Candidate, FixedCandidates
 from agents.expert.collect import Stratum
 from agents.expert.explorer import Strength
-from agents.expert.own_words import own_words
 from agents.expert.recipe import Part, Recipe, quotas
+from agents.expert.recorded_replies import recorded_replies
 from agents.expert.replayed import PLAYED
 from er_gym.rollout.judgement import judged
 from er_gym.rollout.records import ERROR, EpisodeRecord
@@ -194,7 +194,7 @@ def _unfitness(episode: EpisodeRecord, run: RunDirectory, rules: SelectionRules)
     if len(steps) > rules.most_actions:
         return TOO_LONG
     try:
-        words = own_words(run.path, episode)
+        words = recorded_replies(run.path, episode)
     except ValueError:
         return NO_CONVERSATION
     if words is not None and rules.most_tokens is not None and words.tokens > rules.most_tokens:

@@ -14,8 +14,8 @@ from agents.expert.recorder import (
     OBS_MODE,
     TrajectoryHeader,
     TrajectoryRecorder,
-    bill_of,
-    spoken,
+    thoughts_text,
+    total_reply,
 )
 from agents.expert.thought_kinds import Event, ThoughtKinds
 from agents.expert.writers.base import ThoughtRequest, ThoughtWriter, WrittenThoughts
@@ -92,10 +92,12 @@ class ThinkingAgent:
         this = _Thoughtless(kinds, recorder.pictures_now, self._random.getrandbits(48))
         if self._think_later:
             self._thoughtless.append(this)
-            return Decision(intent.action, reply=bill_of(replies))
+            return Decision(intent.action, reply=total_reply(replies))
         written = self._think(recorder, len(recorder.turns) - 1, this)
         return Decision(
-            intent.action, spoken(written.thoughts), bill_of((*replies, *written.replies))
+            intent.action,
+            thoughts_text(written.thoughts),
+            total_reply((*replies, *written.replies)),
         )
 
     def attachments(self, episode: EpisodeRecord, stem: str) -> dict[str, bytes]:

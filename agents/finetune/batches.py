@@ -22,7 +22,7 @@ _POOL = 64
 the less random who meets whom."""
 
 
-class Order(Sampler[int]):
+class EpochSampler(Sampler[int]):
     """The order of the conversations in an epoch: drawn from the seed and the epoch alone.
 
     Consecutive ``batch`` indices are a batch. With ``buckets``, they are of similar length; the

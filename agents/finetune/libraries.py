@@ -25,7 +25,7 @@ def quiet_libraries() -> Iterator[None]:
 
 
 @contextmanager
-def fast_arithmetic() -> Iterator[None]:
+def flush_denormals() -> Iterator[None]:
     """Flush denormal numbers to 0 within the context."""
     # AdamW's moments of rows that no token uses decay to denormal numbers, which makes every
     # operation on them many times slower.

@@ -20,7 +20,7 @@ from torch.nn import functional
 from torch.utils.tensorboard import SummaryWriter
 
 from agents.finetune import machine
-from agents.finetune.batches import Order
+from agents.finetune.batches import EpochSampler
 from agents.finetune.model_files import History, ModelFiles, write_agent_files
 from agents.finetune.run_files import (
     LOGS,
@@ -28,7 +28,7 @@ from agents.finetune.run_files import (
     RunFiles,
     draft_of,
     move_into_place,
-    whole_folder,
+    replaced_folder,
 )
 from er_gym.activity import begin
 
@@ -121,7 +121,7 @@ class FinetuneTrainer(transformers.Trainer):
         self,
         network: Any,
         arguments: transformers.TrainingArguments,
-        order: Order,
+        order: EpochSampler,
         run: RunFiles,
         keep: int,
         **more: Any,
@@ -133,7 +133,7 @@ class FinetuneTrainer(transformers.Trainer):
         self._learnt_only = LearntOnly(network)
         self.tokens = 0
 
-    def _get_train_sampler(self, train_dataset: Any = None) -> Order:
+    def _get_train_sampler(self, train_dataset: Any = None) -> EpochSampler:
         return self._order
 
     def compute_loss(self, model: Any, inputs: dict[str, Any], *args: Any, **kwargs: Any) -> Any:
@@ -190,7 +190,7 @@ class FinetuneTrainer(transformers.Trainer):
         with ExitStack() as stack:
             folder = draft_of(self._run.model)
             if self.args.should_save:
-                stack.enter_context(whole_folder(self._run.model))
+                stack.enter_context(replaced_folder(self._run.model))
             if is_sharded(self.args):
                 super().save_model(str(folder), _internal_call=True)
             elif self.args.should_save:

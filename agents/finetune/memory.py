@@ -28,7 +28,7 @@ GIB = 1 << 30
 
 
 @dataclass(frozen=True)
-class VisionNumbers:
+class VisionDimensions:
     """A vision tower: layers, sizes, and the projectors that turn its features into tokens.
 
     Attributes:
@@ -67,7 +67,7 @@ class VisionNumbers:
 
 
 @dataclass(frozen=True)
-class ModelNumbers:
+class ModelDimensions:
     """What the memory depends on in a model's configuration.
 
     Attributes:
@@ -85,7 +85,7 @@ class ModelNumbers:
     kv_heads: int
     head_size: int
     tied: bool
-    vision: VisionNumbers | None = None
+    vision: VisionDimensions | None = None
 
     @property
     def attended(self) -> int:
@@ -125,7 +125,7 @@ class ModelNumbers:
 
 
 @dataclass(frozen=True)
-class Plan:
+class TuningSetup:
     """How a model is tuned, as far as memory depends on it.
 
     Attributes:
@@ -153,7 +153,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Memory:
+class MemoryEstimate:
     """Bytes, by what they are for; on one GPU, or of the process. See the module."""
 
     weights: int
@@ -169,11 +169,13 @@ class Memory:
         return sum(getattr(self, each.name) for each in fields(self))
 
     def __str__(self) -> str:
-        parts = ", ".join(f"{each.name} {size(getattr(self, each.name))}" for each in fields(self))
-        return f"{size(self.total)} ({parts})"
+        parts = ", ".join(
+            f"{each.name} {bytes_text(getattr(self, each.name))}" for each in fields(self)
+        )
+        return f"{bytes_text(self.total)} ({parts})"
 
 
-def memory(model: ModelNumbers, plan: Plan) -> Memory:
+def estimate_memory(model: ModelDimensions, plan: TuningSetup) -> MemoryEstimate:
     """An estimate of the most memory that training takes."""
     small = 2 if plan.precision == "bfloat16" else 4
     trained = trained_parameters(model, plan)
@@ -193,10 +195,10 @@ def memory(model: ModelNumbers, plan: Plan) -> Memory:
     overhead = GIB // 2
     if plan.on_gpu:
         overhead = GIB + (weights + gradients + optimizer + activations + logits) // 10
-    return Memory(weights, gradients, optimizer, activations, logits, overhead)
+    return MemoryEstimate(weights, gradients, optimizer, activations, logits, overhead)
 
 
-def trained_parameters(model: ModelNumbers, plan: Plan) -> int:
+def trained_parameters(model: ModelDimensions, plan: TuningSetup) -> int:
     """How many parameters are trained."""
     if plan.lora_rank is not None:
         return model.lora(plan.lora_rank)
@@ -207,7 +209,7 @@ def trained_parameters(model: ModelNumbers, plan: Plan) -> int:
     return learnt
 
 
-def _activations(model: ModelNumbers, plan: Plan, rows: int, small: int) -> int:
+def _activations(model: ModelDimensions, plan: TuningSetup, rows: int, small: int) -> int:
     """Bytes that wait for the backward pass, and those of the vision tower, which may not."""
     full = plan.lora_rank is None
     # Full fine-tuning has embeddings in float32, and so what runs from layer to layer.
@@ -232,7 +234,7 @@ def _activations(model: ModelNumbers, plan: Plan, rows: int, small: int) -> int:
     return found
 
 
-def numbers_of(config: Mapping[str, Any]) -> ModelNumbers:
+def dimensions_of(config: Mapping[str, Any]) -> ModelDimensions:
     """The numbers of a model by its ``config.json``, of today's transformers or an older one.
 
     Raises:
@@ -241,7 +243,7 @@ def numbers_of(config: Mapping[str, Any]) -> ModelNumbers:
     text = {**config, **config.get("text_config", {})}
     try:
         heads = text["num_attention_heads"]
-        return ModelNumbers(
+        return ModelDimensions(
             layers=text["num_hidden_layers"],
             hidden=text["hidden_size"],
             intermediate=text["intermediate_size"],
@@ -261,14 +263,14 @@ def numbers_of(config: Mapping[str, Any]) -> ModelNumbers:
         ) from None
 
 
-def _vision(config: Mapping[str, Any], out: int) -> VisionNumbers:
+def _vision(config: Mapping[str, Any], out: int) -> VisionDimensions:
     # Qwen2-VL calls the tower's size embed_dim, and the language model's hidden_size.
     first = "embed_dim" in config
     hidden = config["embed_dim"] if first else config["hidden_size"]
     wide = int(hidden * config.get("mlp_ratio", 4)) if first else config["intermediate_size"]
     side = config.get("patch_size", 14)
     channels = config.get("in_channels", config.get("in_chans", 3))
-    return VisionNumbers(
+    return VisionDimensions(
         layers=config["depth"],
         hidden=hidden,
         intermediate=wide,
@@ -281,6 +283,6 @@ def _vision(config: Mapping[str, Any], out: int) -> VisionNumbers:
     )
 
 
-def size(count: int) -> str:
+def bytes_text(count: int) -> str:
     """A number of bytes in words."""
     return f"{count / GIB:.1f} GiB" if count >= GIB / 10 else f"{count / (1 << 20):.0f} MiB"

@@ -23,7 +23,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from agents.finetune.settings import Stage
 from agents.vlm.clients.adapters import base_directory
-from agents.vlm.clients.checkpoint import one_line
+from agents.vlm.clients.checkpoint import error_summary
 from agents.vlm.clients.checkpoint import template_of as template_of_files
 from agents.vlm.tuned_model import AGENT, model_directory
 from er_gym.tasks.reading import read_bytes, read_yaml
@@ -142,8 +142,9 @@ def open_model(path: Path) -> ModelFiles:
         where = path if (path / "tokenizer_config.json").is_file() else base
         tokenizer = transformers.AutoTokenizer.from_pretrained(where, **here)
     except Exception as error:  # what broken files make of the libraries can be any exception
-        raise ValueError(f"{path}: its config or tokenizer cannot be loaded: {one_line(error)}") \
-            from None  # fmt: skip
+        raise ValueError(
+            f"{path}: its config or tokenizer cannot be loaded: {error_summary(error)}"
+        ) from None
     template = template_of_files(str(where)) or tokenizer.chat_template
     if not isinstance(template, str):
         raise ValueError(
@@ -168,7 +169,7 @@ def _image_processor(path: Path, base: Path, config: Any) -> Any:
     except Exception as error:
         raise ValueError(
             f"{path} has no image processor that can be loaded, though the model has vision: "
-            f"{one_line(error)}; put its preprocessor_config.json beside it"
+            f"{error_summary(error)}; put its preprocessor_config.json beside it"
         ) from None
     if not (hasattr(found, "merge_size") and hasattr(config, "image_token_id")):
         raise ValueError(
@@ -184,7 +185,7 @@ def _history(path: Path) -> History:
     try:
         return History.model_validate_json(read_bytes(path / HISTORY))
     except ValidationError as error:
-        raise ValueError(f"{path / HISTORY} is damaged: {one_line(error)}") from None
+        raise ValueError(f"{path / HISTORY} is damaged: {error_summary(error)}") from None
 
 
 def _agent(path: Path) -> Mapping[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from agents.configs import ConfigKind
-from agents.finetune.memory import ModelNumbers, numbers_of
+from agents.finetune.memory import ModelDimensions, dimensions_of
 from er_gym.tasks.reading import parse_json, read_text
 
 _MOST_TIMES_LONGER = 200
@@ -37,9 +37,9 @@ class ModelFacts(BaseModel):
     config: dict[str, Any]
 
     @property
-    def numbers(self) -> ModelNumbers:
+    def numbers(self) -> ModelDimensions:
         """The sizes that decide how much memory it takes."""
-        return numbers_of(self.config)
+        return dimensions_of(self.config)
 
     @property
     def token_side(self) -> int:
@@ -106,7 +106,7 @@ def _of_directory(directory: Path, known: dict[str, ModelFacts]) -> ChosenModel:
     config = parse_json(read_text(file), file)
     if not isinstance(config, dict):
         raise ValueError(f"{file} is no model's configuration; it holds no table")
-    numbers = numbers_of(config)
+    numbers = dimensions_of(config)
     sizes = numbers.layers, numbers.hidden
     for name, facts in known.items():
         same = facts.model_type == config.get("model_type")

@@ -125,7 +125,7 @@ def draft_of(folder: Path) -> Path:
 
 
 @contextmanager
-def whole_folder(folder: Path) -> Iterator[Path]:
+def replaced_folder(folder: Path) -> Iterator[Path]:
     """Write a folder whole or not at all: fill the folder that this gives."""
     draft = draft_of(folder)
     shutil.rmtree(draft, ignore_errors=True)

@@ -162,7 +162,8 @@ def _of_frames(frames: FrameSet, settings: DataSettings) -> _Source:
     if kept:
         raise ValueError(
             f"{frames.path} shows rooms that are kept for evaluation, such as {kept[0]}; learn "
-            "from frames of the suite train, and measure with these: python -m benchmarks.eyes"
+            "from frames of the suite train, and measure with these: "
+            "python -m benchmarks.vision_probe"
         )
     dialect, language = load_dialect(settings.dialect), settings.language or "en"
     try:

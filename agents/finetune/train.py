@@ -23,11 +23,17 @@ from transformers.trainer_utils import set_seed
 
 import er_gym
 from agents.finetune import machine
-from agents.finetune.batches import Collator, EncodedChats, Order
+from agents.finetune.batches import Collator, EncodedChats, EpochSampler
 from agents.finetune.feedback import FEEDBACK, add_feedback, add_rows, needs_feedback
-from agents.finetune.libraries import fast_arithmetic, quiet_libraries
+from agents.finetune.libraries import flush_denormals, quiet_libraries
 from agents.finetune.loop import FinetuneTrainer, Progress, TrainingLog, is_sharded
-from agents.finetune.memory import Memory, Plan, memory, numbers_of, size
+from agents.finetune.memory import (
+    MemoryEstimate,
+    TuningSetup,
+    bytes_text,
+    dimensions_of,
+    estimate_memory,
+)
 from agents.finetune.model_files import (
     History,
     ModelFiles,
@@ -43,7 +49,7 @@ from agents.finetune.samples import Samples, open_samples
 from agents.finetune.settings import FinetuneSettings, Lora
 from agents.finetune.tokens import EncodedChat, Encoder, check_lengths
 from agents.vlm.clients.adapters import adapter_chain, with_adapter
-from agents.vlm.clients.checkpoint import load_weights, one_line
+from agents.vlm.clients.checkpoint import error_summary, load_weights
 from agents.vlm.tuned_model import recorded_pictures
 from er_gym.activity import begin
 
@@ -179,7 +185,7 @@ def _train(
     free = machine.free_memory()
     if needed.total > free and not ignore_memory:
         raise ValueError(
-            f"this would take about {needed}, and {size(free)} of "
+            f"this would take about {needed}, and {bytes_text(free)} of "
             f"{'GPU memory' if machine.on_gpu() else 'memory'} are free; set a lower "
             "training.batch, training.checkpointing=true, model.lora.rank=8 or a lower "
             "data.max_pixels, take a smaller model, or give --ignore-memory"
@@ -212,7 +218,7 @@ def _train(
     trainer = FinetuneTrainer(
         network,
         arguments,
-        Order(
+        EpochSampler(
             [chat.length for chat in chats],
             settings.training.batch,
             settings.training.seed,
@@ -239,7 +245,7 @@ def _train(
     if last is not None:
         say(f"continues after update {done:,}")
     begin("training")
-    with fast_arithmetic():
+    with flush_denormals():
         trainer.train(resume_from_checkpoint=str(last) if last else None)
 
     # -- the result --
@@ -303,7 +309,7 @@ def _arguments(
             log_level="error",
         )
     except (OSError, ImportError, json.JSONDecodeError) as error:
-        raise ValueError(f"training.deepspeed or training.fsdp: {one_line(error)}") from None
+        raise ValueError(f"training.deepspeed or training.fsdp: {error_summary(error)}") from None
 
 
 def _optimizer(network: Any, settings: FinetuneSettings) -> MuonAdamW | None:
@@ -316,9 +322,9 @@ def _optimizer(network: Any, settings: FinetuneSettings) -> MuonAdamW | None:
 
 def _memory(
     settings: FinetuneSettings, files: ModelFiles, chats: list[EncodedChat], dtype: str, gpus: int
-) -> Memory:
+) -> MemoryEstimate:
     merge = files.image_processor.merge_size**2 if files.has_vision else 1
-    plan = Plan(
+    plan = TuningSetup(
         precision="bfloat16" if dtype == "bfloat16" else "float32",
         lora_rank=settings.model.lora.rank if settings.model.lora else None,
         freeze=settings.model.freeze,
@@ -330,7 +336,7 @@ def _memory(
         gpus=gpus if settings.training.deepspeed or settings.training.fsdp else 1,
         on_gpu=machine.on_gpu(),
     )
-    return memory(numbers_of(files.config.to_dict()), plan)
+    return estimate_memory(dimensions_of(files.config.to_dict()), plan)
 
 
 def _about(chats: list[EncodedChat], samples: Samples) -> str:
@@ -361,7 +367,7 @@ def _load(files: ModelFiles, settings: FinetuneSettings, dtype: str) -> Any:
         for adapter in adapter_chain(files.path)[1]:
             network = with_adapter(network, adapter, merge=True)
     except Exception as error:  # what broken files make of the libraries can be any exception
-        raise ValueError(f"{files.path} cannot be loaded: {one_line(error)}") from None
+        raise ValueError(f"{files.path} cannot be loaded: {error_summary(error)}") from None
     if missing:
         raise ValueError(f"{files.base}: {missing}")
     return network
@@ -401,7 +407,7 @@ def _with_lora(
     try:
         network = peft.get_peft_model(network, config)
     except ValueError as error:
-        raise ValueError(f"model.lora does not fit the model: {one_line(error)}") from None
+        raise ValueError(f"model.lora does not fit the model: {error_summary(error)}") from None
     network.peft_config["default"].base_model_name_or_path = str(files.path)
     return network
 

@@ -98,7 +98,7 @@ class CurveWriter(KVWriter):
         """Nothing to do: each line is written at once."""
 
 
-class BoardWriter(TensorBoardOutputFormat):
+class TensorBoardWriter(TensorBoardOutputFormat):
     """Writes each logger dump for TensorBoard.
 
     Args:

@@ -15,7 +15,7 @@ from agents.rl.packed import Column, PackedRows, concatenated, packed
 from agents.rl.policy_observation import Obs
 from agents.scripted.oracle import OracleAgent
 from agents.scripted.searcher import SearcherAgent
-from er_gym.envs.actions import ACTIONS, INDEX, Action, understand
+from er_gym.envs.actions import ACTIONS, INDEX, Action, parse_action
 from er_gym.envs.info import with_details
 from er_gym.rollout.agent import Agent
 from er_gym.rollout.loop import transitions
@@ -72,7 +72,7 @@ def demonstrate(
         agent.reset(info["task"], info["seen"], info)
         steps = []
         for each in transitions(env, agent, obs, info, seen="seen"):
-            mask, action = each.info_before["action_mask"], understand(each.decision.action)[0]
+            mask, action = each.info_before["action_mask"], parse_action(each.decision.action)[0]
             steps.append(_Step(each.before, mask, action, each.reward))
             last = each.info
         successes += last["success"]

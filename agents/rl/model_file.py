@@ -84,7 +84,7 @@ def _logged(model: BaseAlgorithm) -> dict[str, float]:
     return {name: float(value) for name, value in found.items() if hasattr(value, "__float__")}
 
 
-def log_again(file: Path, model: BaseAlgorithm) -> None:
+def restore_logged_values(file: Path, model: BaseAlgorithm) -> None:
     """Record in a learner's logger what a file says was recorded and not written yet.
 
     Raises:

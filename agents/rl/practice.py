@@ -30,7 +30,9 @@ def advised_envs(config: TrainConfig, seed: int) -> VecEnv:
     return env
 
 
-def practise(model: MaskablePPO, env: VecEnv, how: Practice, gamma: float) -> Demonstrations:
+def play_with_advice(
+    model: MaskablePPO, env: VecEnv, how: Practice, gamma: float
+) -> Demonstrations:
     """Let the policy play, and record the searcher's action for every step.
 
     Args:

@@ -7,7 +7,7 @@ from typing import Any
 
 import gymnasium
 
-from er_gym.plugins import PluginError, Registry, reason
+from er_gym.plugins import PluginError, Registry, error_line
 
 Env = gymnasium.Env[Any, Any]
 REWARDS: Registry[Callable[[Env], Env]] = Registry(
@@ -38,8 +38,8 @@ def with_reward(env: Env, name: str) -> Env:
         wrapped = make(env)
     except Exception as error:  # other people's code can raise anything
         raise PluginError(
-            f"reward wrapper {name!r} cannot be put around the environment ({reason(error)}); give "
-            f"{REWARDS.expected}"
+            f"reward wrapper {name!r} cannot be put around the environment ({error_line(error)}); "
+            f"give {REWARDS.expected}"
         ) from error
     if not isinstance(wrapped, gymnasium.Env) or wrapped.unwrapped is not env.unwrapped:
         raise PluginError(

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 from agents.scripted.searcher import instruction as words
 from agents.scripted.searcher.agent import PROCESSES
-from agents.scripted.searcher.instruction import Goal, understand
+from agents.scripted.searcher.instruction import Goal, parse_instruction
 from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
 
@@ -62,7 +62,7 @@ def subtasks(instruction: str) -> tuple[Subtask, ...]:
     pick the Egg up again.
     """
     found: list[Subtask] = []
-    for goal in understand(instruction):
+    for goal in parse_instruction(instruction):
         water_runs = Subtask(verbs.TOGGLE, "Faucet") in found
         for step in _steps(goal):
             if not (water_runs and goal.kind == words.WASH and step.thing == "Faucet"):

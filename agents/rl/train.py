@@ -28,12 +28,12 @@ from agents.configs import dump
 from agents.rl import dqn, policy
 from agents.rl.callbacks import (
     CURVE,
-    BoardWriter,
     Checkpoints,
     Curriculum,
     CurveWriter,
     HeldOutEvaluation,
     SuccessByType,
+    TensorBoardWriter,
     TorchThreads,
     TrackerWriter,
     evaluated_at,
@@ -41,7 +41,7 @@ from agents.rl.callbacks import (
 )
 from agents.rl.config import EnvConfig, Evaluation, TrainConfig, load_config
 from agents.rl.envs import evaluation_config, make_env
-from agents.rl.model_file import log_again, placeholder_env, restore, save
+from agents.rl.model_file import placeholder_env, restore, restore_logged_values, save
 from agents.rl.policy_file import CONFIG, LEARNERS, MODEL
 from agents.rl.policy_observation import PolicyObservation
 from agents.rl.vec_env import WorkerVecEnv
@@ -149,7 +149,7 @@ def _train(
             if config.warm_start is not None:
                 assert isinstance(model, MaskablePPO)  # as the configuration has checked
                 begin(f"cloning {config.warm_start.teacher}")
-                with fast_arithmetic():
+                with training_speedups():
                     warm_start(model, config, config.warm_start, run, seed, show_progress)
                 logger.dump(0)  # a line with its duration
                 save(model, run)
@@ -159,10 +159,10 @@ def _train(
             set_random_seed(seed)
         model.set_logger(logger)
         if (run / MODEL).exists():
-            log_again(run / MODEL, model)
+            restore_logged_values(run / MODEL, model)
         begin("loading the rooms")
         try:
-            with fast_arithmetic():
+            with training_speedups():
                 model.learn(
                     max(config.total_steps - steps, 0),
                     callback=CallbackList(callbacks),
@@ -184,7 +184,7 @@ def _train(
 
 
 @contextmanager
-def fast_arithmetic() -> Iterator[None]:
+def training_speedups() -> Iterator[None]:
     """Flush denormal numbers to 0 and skip the validation of distributions within the context."""
     # Adam's moments of weights without gradient, such as those of types in no training room, decay
     # to denormal numbers, which makes every operation a hundred times slower.
@@ -233,7 +233,7 @@ def _logger(config: TrainConfig, run: Path, steps: int | None) -> Logger:
     """What is logged, rewound to the checkpoint of ``steps`` from which the run goes on."""
     writers: list[KVWriter] = [CurveWriter(run, steps)]
     if config.tensorboard:
-        writers.append(BoardWriter(run / TENSORBOARD, steps))
+        writers.append(TensorBoardWriter(run / TENSORBOARD, steps))
     if config.wandb:
         writers.append(_wandb_writer(config, run))
     return Logger(str(run), writers)

@@ -15,7 +15,7 @@ from sb3_contrib import MaskablePPO
 from agents.rl.cloning import clone_behaviour, collect_demonstrations
 from agents.rl.config import Practice, TrainConfig, WarmStart
 from agents.rl.demonstrations import Demonstrations, concatenate
-from agents.rl.practice import advised_envs, practise
+from agents.rl.practice import advised_envs, play_with_advice
 from er_gym.writing import write_atomic
 
 WARM_START = "warm_start.json"
@@ -86,7 +86,7 @@ def _rounds(
     env = advised_envs(config, seed)
     try:
         for number in range(practice.rounds):
-            new = practise(model, env, practice, config.algorithm.gamma)
+            new = play_with_advice(model, env, practice, config.algorithm.gamma)
             gathered = concatenate([gathered, new])
             begin = how.epochs + number * practice.epochs
             order = int(np.random.SeedSequence([seed, number + 1]).generate_state(1)[0])

@@ -24,8 +24,8 @@ from agents.vlm.record import (
     reply_fields,
     settings_to_record,
 )
+from agents.vlm.reply_causes import causes_of
 from agents.vlm.settings import AgentSettings
-from agents.vlm.shortcomings import causes_of
 from er_gym.data.dialects import shows_anew
 from er_gym.data.scene_text import Perceived
 from er_gym.envs.actions import NO_ACTION, Action, applies

@@ -16,7 +16,7 @@ from agents.vlm.prompt_set import (
     TurnContext,
     without_marks,
 )
-from er_gym.data.dialects import DialectTexts, LastDeed, load_dialect, system_text, user_turn
+from er_gym.data.dialects import ActionResult, DialectTexts, load_dialect, system_text, user_turn
 from er_gym.data.trajectory import Language
 from er_gym.tasks import verbs
 
@@ -58,17 +58,19 @@ class DialectPrompts:
 
     def next(self, turn: TurnContext, last_action: LastAction) -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
-        last = LastDeed(
+        last = ActionResult(
             last_action.action, last_action.success, without_marks(last_action.feedback)
         )
         return self._told(turn, last, last_action.directions)
 
     def feedback(self, *, problem: str, decide: Decide, action: str = "") -> str:
         """See :class:`~agents.vlm.prompt_set.PromptSet`."""
-        last = LastDeed(without_marks(action) or _NOTHING, False, without_marks(problem))
+        last = ActionResult(without_marks(action) or _NOTHING, False, without_marks(problem))
         return "".join(user_turn(self.texts, "", last, ()))
 
-    def _told(self, turn: TurnContext, last: LastDeed | None, directions: tuple[str, ...]) -> str:
+    def _told(
+        self, turn: TurnContext, last: ActionResult | None, directions: tuple[str, ...]
+    ) -> str:
         marks = [(each, IMAGE_MARK) for each in directions if turn.sees == "pictures"]
         task = without_marks(turn.task)
         return "".join(user_turn(self.texts, task, last, marks, turn.now, turn.before))

@@ -35,7 +35,7 @@ from benchmarks.checks.bad_files import make
 from benchmarks.cli.main import main as er_gym
 from benchmarks.harness.output import ROOT
 from benchmarks.harness.processes import ER_GYM, kill, members
-from benchmarks.harness.tally import Tally, Try, holds, run_check, tally
+from benchmarks.harness.tally import Tally, Try, has_words, run_check, tally
 
 _AT_ONCE = 2
 _REAL_EVERY = 10
@@ -57,7 +57,7 @@ def check(words: Sequence[str], *, at_least: int | None = None) -> Tally:
     """Try all lines that hold the words, or a number of lines of every kind, and print the
     failures.
     """
-    chosen = [line for line in lines() if holds(str(line), words)]
+    chosen = [line for line in lines() if has_words(str(line), words)]
     return tally("command lines", _tries(chosen if at_least is None else _choice(chosen, at_least)))
 
 

@@ -26,7 +26,7 @@ from PIL import Image
 
 from benchmarks.checks.foreign_values import NAMES, PICTURES, contents, mutations
 from benchmarks.checks.misuse.tries import require
-from benchmarks.harness.tally import Tally, holds, run_check, tally
+from benchmarks.harness.tally import Tally, has_words, run_check, tally
 from er_gym.data.collection import Collection
 from er_gym.data.exports import export
 from er_gym.data.pictures import open_picture
@@ -71,7 +71,7 @@ class _Try(NamedTuple):
 def check(words: Sequence[str] = ()) -> Tally:
     """Try all whose names hold the words, and print the failures."""
     every = (*_fields(), *_ids(), *_links(), *_pictures(), *_elsewhere(), *_exports())
-    chosen = (each for each in every if holds(each.name, words))
+    chosen = (each for each in every if has_words(each.name, words))
     return tally("foreign files", ((f"{each.name:.200}", _problems(each)) for each in chosen))
 
 

@@ -133,7 +133,7 @@ def show(report: FuzzReport, plan: FuzzPlan, seconds: float) -> int:
         kind = _kind(step.problems[0])
         kinds[kind] += 1
         if kinds[kind] <= _SHOWN:
-            echo(f"{step}\n  again: {again(plan, step.run)}")
+            echo(f"{step}\n  again: {repeat_command(plan, step.run)}")
     for kind, count in kinds.items():
         if count > _SHOWN:
             echo(f"{count - _SHOWN} more where: {kind}")
@@ -154,7 +154,7 @@ def _kind(problem: str) -> str:
     return re.sub(r"\S+\|\S+|\b\d+(?= )", "…", problem).partition(": ")[0][:100]
 
 
-def again(plan: FuzzPlan, run: int) -> str:
+def repeat_command(plan: FuzzPlan, run: int) -> str:
     """The command that repeats a run."""
     every = tuple(plan.scenes) == tuple(SCENE_NAMES)
     scenes = "" if every else f" --scenes {','.join(plan.scenes)}"

@@ -32,11 +32,11 @@ def main(quick: bool, every: bool) -> None:
         click.echo(tally)
         tallies.append(tally)
     rows = [
-        (each.what, each.tried, each.short, f"{each.seconds:.0f}")
+        (each.what, each.tried, each.failed, f"{each.seconds:.0f}")
         for each in (*tallies, sum(tallies, Tally("in all")))
     ]
-    print_table("In all", ("", "tried", "fall short", "seconds"), rows)
-    raise SystemExit(int(any(tally.short for tally in tallies)))
+    print_table("In all", ("", "tried", "failed", "seconds"), rows)
+    raise SystemExit(int(any(tally.failed for tally in tallies)))
 
 
 def _tallies(lines: int | None) -> Iterator[Tally]:

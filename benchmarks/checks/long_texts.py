@@ -24,7 +24,7 @@ from functools import lru_cache
 from types import FrameType
 from typing import Any
 
-from benchmarks.harness.tally import Tally, Try, holds, run_check, tally
+from benchmarks.harness.tally import Tally, Try, has_words, run_check, tally
 
 LONG = 100_000
 _SHORT = 1_500
@@ -152,22 +152,22 @@ def readers() -> Mapping[str, Reader]:
     import numpy as np  # noqa: F401 (before the clock runs)
 
     from agents.expert.model_places import named_places
-    from agents.expert.own_words import split_speech
-    from agents.expert.writers.replies import OwnWords, quoted, read_thought
-    from agents.scripted.searcher.instruction import understand
+    from agents.expert.recorded_replies import split_speech
+    from agents.expert.writers.replies import EchoCheck, quoted, read_thought
+    from agents.scripted.searcher.instruction import parse_instruction
     from agents.vlm.chat import Reply
     from agents.vlm.clients.chat_completions import error_text, read_completion, reply_of
     from agents.vlm.clients.failures import refusal_of
     from agents.vlm.matching import Matcher
     from agents.vlm.parsing import parse
     from agents.vlm.redaction import Secrets
+    from agents.vlm.reply_causes import causes_of
     from agents.vlm.settings import Matching
-    from agents.vlm.shortcomings import causes_of
     from benchmarks.monitor.formats import brief, visible
     from er_gym.data.critic import LONGEST_WORD, check
-    from er_gym.data.heard import language_of, thoughts_of, user_message
     from er_gym.data.knowledge import Knowledge
     from er_gym.data.mentions import find_mentions, named_in
+    from er_gym.data.parse_conversation import language_of, thoughts_of, user_message
     from er_gym.data.sharegpt_report import decision
     from er_gym.data.trajectory import Subgoal
     from er_gym.data.words import count_words, sentences
@@ -175,7 +175,7 @@ def readers() -> Mapping[str, Reader]:
     from er_gym.tasks.paraphrase import usable
 
     matcher = Matcher(Matching())
-    own = OwnWords.than(["Say what you see and where you go, in one or two sentences."])
+    own = EchoCheck.against(["Say what you see and where you go, in one or two sentences."])
     secrets = Secrets("sk-0123456789abcdef", "http://u:p@h/v1?key=0123456789abcdef")
 
     def knowledge(language: Any) -> Knowledge:
@@ -234,7 +234,7 @@ def readers() -> Mapping[str, Reader]:
         "a quotation": lambda text: quoted(Reply(text)),
         "places": lambda text: named_places(text, ["Fridge", "CounterTop"]),
         "a paraphrase": lambda text: usable(text, "Find the Apple.", ["Apple"]),
-        "an instruction": understand.__wrapped__,
+        "an instruction": parse_instruction.__wrapped__,
         "a text of a page": visible,
         "a line of a page": brief,
     }
@@ -326,7 +326,7 @@ def check(words: Sequence[str] = (), *, framed: bool = True) -> Tally:
 
 def _tries(words: Sequence[str], framed: bool) -> Iterator[Try]:
     for reader, read in readers().items():
-        if holds(reader, words):
+        if has_words(reader, words):
             read("Put the Apple into the Fridge.")  # what is loaded once is loaded now
             grows = () if reader in BOUNDED else growing(read, framed=framed)
             for name, problems in (*grows, *slow(read, framed=framed)):

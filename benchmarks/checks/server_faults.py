@@ -37,7 +37,7 @@ from benchmarks.harness import processes
 from benchmarks.harness.chat_server import ChatServer
 from benchmarks.harness.output import ROOT
 from benchmarks.harness.processes import ER_GYM
-from benchmarks.harness.tally import Tally, Try, holds, run_check, tally
+from benchmarks.harness.tally import Tally, Try, has_words, run_check, tally
 from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.run_directory import SPENDING
 
@@ -59,12 +59,12 @@ def check(words: Sequence[str], *, with_runs: bool = True) -> Tally:
 
 
 def _tries(words: Sequence[str], with_runs: bool) -> Iterator[Try]:
-    chosen = [case for case in CASES if holds(case.name, words)]
+    chosen = [case for case in CASES if has_words(case.name, words)]
     with _logged() as log, ThreadPoolExecutor(_AT_ONCE) as pool:
         for case, problems in zip(chosen, pool.map(_try, chosen), strict=True):
             yield case.name, problems
     yield "the logs", ["the key is in them"] if KEY in log.getvalue() else []
-    runs = [run for run in RUNS if with_runs and holds(run.name, words)]
+    runs = [run for run in RUNS if with_runs and has_words(run.name, words)]
     with ThreadPoolExecutor(_RUNS_AT_ONCE) as pool:
         for run, problems in zip(runs, pool.map(_play, runs), strict=True):
             yield f"er-gym bench, {run.name}", problems

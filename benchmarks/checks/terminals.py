@@ -21,7 +21,7 @@ from pathlib import Path
 
 from benchmarks.harness.output import ROOT
 from benchmarks.harness.processes import ER_GYM, TerminalRun, run
-from benchmarks.harness.tally import Tally, Try, holds, run_check, tally
+from benchmarks.harness.tally import Tally, Try, has_words, run_check, tally
 
 _CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f]")
 _SECONDS = 300.0
@@ -98,7 +98,7 @@ def check(
         command: of er-gym.
         checkout: whether to try them in the checkout, too.
     """
-    chosen = (each for each in LINES if (each.quick or not quick) and holds(each.words, words))
+    chosen = (each for each in LINES if (each.quick or not quick) and has_words(each.words, words))
     return tally("terminal lines", _tries(chosen, command, checkout))
 
 

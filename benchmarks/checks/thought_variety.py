@@ -25,7 +25,7 @@ from agents.expert.players import PlaySettings, Thinkers
 from agents.expert.recipe import ANOMALY, EXPLORED
 from agents.expert.thought_kinds import load_thought_kinds
 from agents.expert.writers.base import ThoughtRequest, ThoughtWriter
-from agents.expert.writers.grounded import sentences, words
+from agents.expert.writers.grounded import length_in_words, sentences
 from agents.expert.writers.registry import WRITERS
 from benchmarks.harness.measuring import timed
 from er_gym import EmbodiedEnv
@@ -106,7 +106,7 @@ def main(episodes: int, language: Language, suite: str, seed: int, top: int, che
             for record, limit in zip(records, request.limits, strict=True):
                 thoughts[record.text] += 1
                 said.update(sentences(record.text, language))
-                lengths.append(words(record.text, language))
+                lengths.append(length_in_words(record.text, language))
                 if checked:
                     found = check(record.text, record.kind, request.knowledge, limit=limit)
                     refused += [(each, record.text, request) for each in found]

@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable, Iterator
 
 from benchmarks.cli.live_line import LINE
-from benchmarks.terminal import echo, plain
+from benchmarks.terminal import echo, without_control_codes
 
 Count = Callable[[], str]
 _HEARD = "er_gym.activity"
@@ -31,11 +31,11 @@ def doing(what: str, count: Count | None = None) -> None:
     if not what:
         LINE.end()
     elif _is_terminal():
-        LINE.show(plain(what), count)
+        LINE.show(without_control_codes(what), count)
 
 
 @contextlib.contextmanager
-def saying_what_it_does() -> Iterator[None]:
+def showing_activity() -> Iterator[None]:
     """Within, what lower layers tell is shown; the line is gone at the end, in any case."""
     log, heard = logging.getLogger(_HEARD), _Heard()
     level, propagates = log.level, log.propagate

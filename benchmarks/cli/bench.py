@@ -33,7 +33,7 @@ from benchmarks.cli.options import (
     protocol_option,
     scorer_option,
     seed_option,
-    shared,
+    shared_option,
     split,
     with_options,
 )
@@ -100,14 +100,14 @@ class BenchOptions(OptionGroup):
         type=click.Choice(TRACKERS),
         help="Also log the run's figures in the format of this program; may be repeated.",
     )
-    seed: int = shared(seed_option)
+    seed: int = shared_option(seed_option)
     backend: str | None = option(help="The engine: embedded or unity.  [default: the suite's]")
     instances: str | None = option(
         help="Which object a type name means: target or explore.  [default: the suite's]",
     )
-    protocol: str = shared(protocol_option)
-    faults: Faults | None = shared(faults_option)
-    scorer: str = shared(scorer_option)
+    protocol: str = shared_option(protocol_option)
+    faults: Faults | None = shared_option(faults_option)
+    scorer: str = shared_option(scorer_option)
 
 
 @click.command(name="bench")
@@ -129,7 +129,7 @@ def bench(options: BenchOptions, executor_options: ExecutorOptions, vlm_options:
     from er_gym.rollout.agent import CannotGoOn
     from er_gym.rollout.outcomes import Outcomes
     from er_gym.rollout.run_directory import Manifest, RunDirectory
-    from er_gym.rollout.runner import episodes_of, tell_late
+    from er_gym.rollout.runner import append_missing_events, episodes_of
     from er_gym.rollout.selection import Shard, select
     from er_gym.rollout.worker_pool import WorkerSetupError
     from er_gym.thor import BackendError
@@ -192,7 +192,7 @@ def bench(options: BenchOptions, executor_options: ExecutorOptions, vlm_options:
                     cost,
                 ),
             ):
-                tell_late(run_directory)
+                append_missing_events(run_directory)
                 tracked = tracking(options.track, out, manifest.model_dump())
                 with progress, tracked as listeners:
                     outcome = play(progress, listeners)
@@ -261,7 +261,7 @@ def _prepared_run(
     if vlm_run is None:
         named_agent = NamedAgent(agent)
         with bad_input():
-            shared = workforce.machines.shares_files
+            shared = workforce.worker_backend.shares_files
             make = named_agent if shared else named_agent.carried()
         yield (
             lambda shown, more: run(

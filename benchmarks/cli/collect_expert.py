@@ -180,7 +180,7 @@ class ExpertRun:
 
         writer = ModelWriter(session.name, session.client, self.run.settings, prompts)
         if self.options.places == "model":
-            # An audition does not know which places the model will name.
+            # A prescreening does not know which places the model will name.
             return Thinkers(
                 lambda: writer,
                 lambda seed: ModelPlaces(session.client, prompts, seed),

@@ -20,7 +20,7 @@ from benchmarks.cli.options import (
     OptionGroup,
     Words,
     option,
-    shared,
+    shared_option,
     size_option,
 )
 
@@ -78,8 +78,8 @@ class CollectOptions(OptionGroup):
         is_flag=True,
         help="Record the view as text only, for models without vision: many times as fast.",
     )
-    width: int | None = shared(size_option("--width"))
-    height: int | None = shared(size_option("--height"))
+    width: int | None = shared_option(size_option("--width"))
+    height: int | None = shared_option(size_option("--height"))
     correct: Path | None = option(
         type=EXISTING_FOLDER,
         metavar="RUN",

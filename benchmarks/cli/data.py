@@ -130,7 +130,7 @@ def verify(
                 pictures=pictures,
                 limit=limit,
                 workers=workforce.workers,
-                machines=workforce.machines,
+                worker_backend=workforce.worker_backend,
             )
             for verdict in stack.enter_context(closing(verdicts)):
                 totals.add(verdict)

@@ -49,7 +49,7 @@ def frames(
 
     The poses are those of agents, in the suite's arrangements, with some objects opened or switched
     on. er-gym finetune trains on frames. It refuses frames of evaluation rooms: those are for
-    measuring a model with python -m benchmarks.eyes.
+    measuring a model with python -m benchmarks.vision_probe.
     """
     from er_gym.data.frame_camera import DrawingError, draw_frames, visits
     from er_gym.data.frames import FRAMES, FrameSet

@@ -23,8 +23,8 @@ from benchmarks.cli.activity import doing
 from benchmarks.cli.extras import claimants, extras, installed_version, state_of
 from er_gym.plugins import NOT_FROM_HERE
 from er_gym.thor import SCENE_NAMES, make_controller
+from er_gym.thor.client_folder import GpuMapping, Release
 from er_gym.thor.launcher import executable_in
-from er_gym.thor.places import GpuMapping, Release
 
 
 @dataclass(frozen=True)

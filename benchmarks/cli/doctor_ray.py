@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.cli.doctor_checks import Check
-from er_gym.rollout.cluster.session import RayUnavailable, ray_machines
+from er_gym.rollout.cluster.session import RayUnavailable, ray_backend
 from er_gym.rollout.cluster.settings import RaySettings
 
 _PATIENCE = 120.0
@@ -28,7 +28,7 @@ def ray_checks(address: str, shared: Path | None) -> Iterator[Check]:
     """
     start = time.perf_counter()
     try:
-        with ray_machines(RaySettings(address), lambda line: None):
+        with ray_backend(RaySettings(address), lambda line: None):
             import ray
 
             took = time.perf_counter() - start
@@ -72,8 +72,8 @@ def _workers(nodes: list[dict[str, Any]], mark: tuple[Path, str] | None) -> Iter
     from ray.exceptions import RayError
     from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
+    from er_gym.rollout.cluster.actor_pool import first_line
     from er_gym.rollout.cluster.actors import JobActor, start_actor
-    from er_gym.rollout.cluster.crew import first_line
     from er_gym.rollout.cluster.origin import Origin
 
     actors, begun = [], []

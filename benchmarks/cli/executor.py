@@ -16,7 +16,7 @@ from benchmarks.cli.options import Finite, OptionGroup, Words, option, with_opti
 
 if TYPE_CHECKING:
     from er_gym.rollout.executor import Parallelism
-    from er_gym.rollout.machines import Machines
+    from er_gym.rollout.worker_backend import WorkerBackend
 
 EXECUTORS = ("local", "ray")
 _GIB = 2**30
@@ -27,22 +27,22 @@ class Workforce:
     """The workers of a command.
 
     Attributes:
-        machines: where they run.
+        worker_backend: where they run.
         workers: the largest number of them.
     """
 
-    machines: Machines
+    worker_backend: WorkerBackend
     workers: int
 
     def parallelism(self, concurrency: int = 1) -> Parallelism:
         """The workers for a run with so many episodes at once, where one process plays several."""
         from er_gym.rollout.executor import Parallelism
 
-        return Parallelism(self.workers, concurrency, machines=self.machines)
+        return Parallelism(self.workers, concurrency, worker_backend=self.worker_backend)
 
     def must_see(self, path: Path) -> None:
         """Raise BadInput if workers of other nodes cannot read a file or folder of this machine."""
-        if not self.machines.shares_files:
+        if not self.worker_backend.shares_files:
             raise BadInput(
                 f"the workers read {path}, which other nodes may not have; put it where all nodes "
                 "see it and give --shared-dir"
@@ -116,13 +116,13 @@ class ExecutorOptions(OptionGroup):
         Raises:
             BadInput: there is no such cluster.
         """
-        from er_gym.rollout.machines import THIS_MACHINE
+        from er_gym.rollout.worker_backend import LOCAL_BACKEND
 
         if self.executor != "ray":
-            yield Workforce(THIS_MACHINE, self.workers or default)
+            yield Workforce(LOCAL_BACKEND, self.workers or default)
             return
         from er_gym.rollout.cluster.modules import modules_of
-        from er_gym.rollout.cluster.session import ray_machines
+        from er_gym.rollout.cluster.session import ray_backend
         from er_gym.rollout.cluster.settings import RaySettings
 
         with bad_input():
@@ -132,8 +132,8 @@ class ExecutorOptions(OptionGroup):
                 memory=int((self.worker_memory or 1.0) * _GIB),
                 shared_files=self.shared_dir,
             )
-        with entered(lambda: ray_machines(settings, say, modules_of(agents))) as machines:
-            yield Workforce(machines, self.workers or machines.places)
+        with entered(lambda: ray_backend(settings, say, modules_of(agents))) as worker_backend:
+            yield Workforce(worker_backend, self.workers or worker_backend.capacity)
 
 
 def with_executor_options(

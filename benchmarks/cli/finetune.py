@@ -16,7 +16,7 @@ from benchmarks.cli.options import (
     Words,
     option,
     overrides_option,
-    shared,
+    shared_option,
     with_options,
 )
 from benchmarks.terminal import echo
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from agents.finetune.train import Result
 
 PRINTABLE = ("llama-factory", "ms-swift", "trl", "deepspeed")
-"""As in ``agents.finetune.printing``, which is too slow to import for ``--help``; a test
+"""As in ``agents.finetune.launchers``, which is too slow to import for ``--help``; a test
 compares."""
 
 
@@ -41,7 +41,9 @@ class FinetuneOptions(OptionGroup):
         help="The settings: a YAML file, or the name of one that comes with er-gym, such as "
         "stage1.",
     )
-    overrides: tuple[str, ...] = shared(overrides_option("training.epochs=2 or model.lora.rank=16"))
+    overrides: tuple[str, ...] = shared_option(
+        overrides_option("training.epochs=2 or model.lora.rank=16")
+    )
     model: str = option(
         required=True,
         type=Words(),
@@ -129,7 +131,7 @@ def _print_run(program: str, settings: FinetuneSettings, options: FinetuneOption
     from er_gym.activity import begin_import
 
     begin_import("PyTorch and transformers", "torch", "transformers")
-    from agents.finetune.printing import write_files
+    from agents.finetune.launchers import write_files
 
     data, *more = options.data
     if more:

@@ -217,7 +217,7 @@ def _build(
             order.seed,
             parts=parts,
             workers=workforce.workers,
-            machines=workforce.machines,
+            worker_backend=workforce.worker_backend,
             on_room=on_room,
         )
     return made, verified

@@ -15,7 +15,7 @@ from typing import NoReturn
 
 import click
 
-from benchmarks.cli.activity import doing, new_modules, saying_what_it_does
+from benchmarks.cli.activity import doing, new_modules, showing_activity
 from benchmarks.cli.bench import bench
 from benchmarks.cli.collect import collect
 from benchmarks.cli.data import data
@@ -51,7 +51,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
     # At its end Python looks through all objects for cycles, in seconds where torch is loaded.
     atexit.register(gc.freeze)
     try:
-        with interrupted_by_sigterm(), saying_what_it_does():
+        with interrupted_by_sigterm(), showing_activity():
             code = cli.main(args=args, prog_name="er-gym", standalone_mode=False)
     except click.UsageError as error:
         help_command = f"{error.ctx.command_path if error.ctx else 'er-gym'} --help"

@@ -44,7 +44,7 @@ def option(flag: str = "", **settings: Any) -> Any:
     return field(default=empty, metadata={"flag": flag, "settings": settings})
 
 
-def shared(add: Any) -> Any:
+def shared_option(add: Any) -> Any:
     """A field of a group that an option fills which other commands have, too."""
     (made,) = add(lambda: None).__click_params__
     return field(default=() if made.multiple else None, metadata={"add": add, "flag": made.opts[0]})
@@ -210,7 +210,7 @@ def named(option: str, text: str | None) -> list[str]:
     return split(text)
 
 
-class Place(click.Path):
+class NonEmptyPath(click.Path):
     """A path; an empty one, which click takes for the working directory, is refused."""
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
@@ -232,11 +232,11 @@ class Words(click.ParamType):
         return str(value)
 
 
-PATH = Place(path_type=Path)
-FILE = Place(dir_okay=False, path_type=Path)
-FOLDER = Place(file_okay=False, path_type=Path)
+PATH = NonEmptyPath(path_type=Path)
+FILE = NonEmptyPath(dir_okay=False, path_type=Path)
+FOLDER = NonEmptyPath(file_okay=False, path_type=Path)
 EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
-EXISTING_FOLDER = Place(exists=True, file_okay=False, path_type=Path)
+EXISTING_FOLDER = NonEmptyPath(exists=True, file_okay=False, path_type=Path)
 
 
 class Finite(click.FloatRange):

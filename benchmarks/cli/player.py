@@ -40,7 +40,7 @@ def install(force: bool, python: str | None) -> None:
     """
     from benchmarks.cli.doctor_checks import version_of_client
     from er_gym.thor import player_install as players
-    from er_gym.thor.places import PlayerError
+    from er_gym.thor.client_folder import PlayerError
 
     with bad_input(PlayerError):
         installed = players.install(force=force, python=python or sys.executable)
@@ -62,7 +62,7 @@ def install(force: bool, python: str | None) -> None:
 def uninstall() -> None:
     """Remove what install wrote, and restore what it set aside."""
     from er_gym.thor import player_install as players
-    from er_gym.thor.places import PlayerError, client_home
+    from er_gym.thor.client_folder import PlayerError, client_home
 
     with bad_input(PlayerError):
         unity = players.uninstall()

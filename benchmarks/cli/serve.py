@@ -22,10 +22,10 @@ from benchmarks.cli.options import (
     option,
     overrides_option,
     port_option,
-    shared,
+    shared_option,
     with_options,
 )
-from benchmarks.terminal import echo, plain
+from benchmarks.terminal import echo, without_control_codes
 
 if TYPE_CHECKING:
     from agents.vlm.serving import Command
@@ -45,7 +45,7 @@ class ServerOptions(OptionGroup):
         type=click.Choice(ENGINE_CHOICES),
         help="The server program.  [default: chosen by model and machine]",
     )
-    port: int = shared(port_option(8000))
+    port: int = shared_option(port_option(8000))
     name: str = option(default="", help="The model's name in requests.")
     context: int | None = option(
         type=click.IntRange(min=1),
@@ -186,7 +186,7 @@ def _wait(server: ServerProcess, command: Command, patience: float, verbose: boo
 
     def hear(since: float, last: str) -> None:
         nonlocal latest
-        latest = plain(last)
+        latest = without_control_codes(last)
 
     if verbose or not sys.stderr.isatty():
         echo(f"starting {command.engine} for {command.name}", err=True)

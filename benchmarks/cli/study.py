@@ -10,7 +10,7 @@ import click
 
 from benchmarks.cli.errors import INTERRUPTED, bad_input, print_problem
 from benchmarks.cli.executor import ExecutorOptions, with_executor_options
-from benchmarks.cli.options import Place, overrides_option
+from benchmarks.cli.options import NonEmptyPath, overrides_option
 from benchmarks.terminal import echo, stdout, terminal
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def _study(name: str, what: str, about: str) -> click.Command:
     @overrides_option("evaluation.limit=100")
     @click.option(
         "--out",
-        type=Place(file_okay=False, path_type=Path),
+        type=NonEmptyPath(file_okay=False, path_type=Path),
         help=f"The {what}'s directory.  [default: runs/{what}/CONFIG]",
     )
     @click.option("--until", metavar="PHASE", help="Stop after this phase.")

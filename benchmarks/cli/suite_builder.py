@@ -21,8 +21,8 @@ from pathlib import Path
 
 from er_gym import __version__
 from er_gym.envs.verify import rejection_reason, with_difficulty
-from er_gym.rollout.machines import THIS_MACHINE, Machines
 from er_gym.rollout.verification import make_verifier
+from er_gym.rollout.worker_backend import LOCAL_BACKEND, WorkerBackend
 from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks import jsonl_format
 from er_gym.tasks.arrangement import Arrangement
@@ -110,7 +110,7 @@ def build_suite(
     *,
     parts: Path,
     workers: int = 1,
-    machines: Machines = THIS_MACHINE,
+    worker_backend: WorkerBackend = LOCAL_BACKEND,
     on_room: Callable[[str, BuildResult], None] = lambda scene, made: None,
 ) -> BuildResult:
     """Build the tasks of a suite; the same spec and seed give the same tasks.
@@ -118,7 +118,7 @@ def build_suite(
     Args:
         parts: the folder of finished rooms; made if missing, used if it has some.
         workers: how many processes.
-        machines: where they run.
+        worker_backend: where they run.
         on_room: called with each room and its tasks.
 
     Raises:
@@ -130,7 +130,7 @@ def build_suite(
         on_room(scene, part)
     todo = [scene for scene in spec.rooms if scene not in done]
     make = partial(RoomBuilder, spec, seed)
-    with closing(machines.run_jobs(make, todo, workers=workers)) as results:
+    with closing(worker_backend.run_jobs(make, todo, workers=workers)) as results:
         for scene, made in results:
             if isinstance(made, LostJob):
                 raise RuntimeError(f"{scene}: {made}")

@@ -61,8 +61,8 @@ def verify(suites: tuple[str, ...], executor_options: ExecutorOptions) -> int:
             executor_options.workforce(progress.say, processors()) as workforce,
             progress,
             closing(
-                workforce.machines.run_jobs(
-                    make_verifier, todo, workers=workforce.workers, room=attrgetter("scene")
+                workforce.worker_backend.run_jobs(
+                    make_verifier, todo, workers=workforce.workers, affinity_key=attrgetter("scene")
                 )
             ) as results,
         ):

@@ -80,12 +80,12 @@ def write_files(options: FileOptions) -> bool:
 
 def _export(options: FileOptions, out: Path) -> None:
     from benchmarks.cli.progress import counting
-    from benchmarks.monitor.export import USUAL_EPISODES, Wanted, export
+    from benchmarks.monitor.export import USUAL_EPISODES, ExportRequest, export
 
     assert options.export is not None
     is_file = out.suffix.lower() in (".html", ".htm")
     most = options.episodes
-    wanted = Wanted(
+    wanted = ExportRequest(
         run=options.export,
         out=out,
         episodes=USUAL_EPISODES if most is None and is_file else most,

@@ -17,7 +17,7 @@ from benchmarks.cli.options import (
     agent_config_option,
     option,
     overrides_option,
-    shared,
+    shared_option,
 )
 
 if TYPE_CHECKING:
@@ -31,8 +31,8 @@ class VLMOptions(OptionGroup):
     The budgets limit the whole run, however often it is continued; the minutes limit this command.
     """
 
-    agent_config: str | None = shared(agent_config_option)
-    overrides: Sequence[str] = shared(overrides_option("sampling.temperature=0.7"))
+    agent_config: str | None = shared_option(agent_config_option)
+    overrides: Sequence[str] = shared_option(overrides_option("sampling.temperature=0.7"))
     base_url: Sequence[str] = option(
         type=Words(),
         multiple=True,

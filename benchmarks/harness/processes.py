@@ -31,7 +31,7 @@ _GRACE = 20.0
 
 
 @dataclass(frozen=True)
-class Said:
+class PrintedText:
     """What a command printed at once.
 
     Attributes:
@@ -65,7 +65,7 @@ class TerminalRun:
     code: int = 0
     seconds: float = 0.0
     ending: float = 0.0
-    said: list[Said] = field(default_factory=list)
+    said: list[PrintedText] = field(default_factory=list)
     late: bool = False
 
     def text(self, stream: str = "") -> str:
@@ -74,7 +74,7 @@ class TerminalRun:
         return _ESCAPES.sub("", "".join(told)).replace("\r\n", "\n")
 
     @property
-    def news(self) -> list[Said]:
+    def news(self) -> list[PrintedText]:
         """What differs from what was printed before."""
         shown = [each for each in self.said if each.shown]
         return [
@@ -145,7 +145,7 @@ def run(
                         selector.unregister(key.fd)
                         continue
                     text = data.decode(errors="replace")
-                    done.said.append(Said(time.monotonic() - start, key.data, text))
+                    done.said.append(PrintedText(time.monotonic() - start, key.data, text))
                 if wanted and not interrupted and wanted.search(done.text()):
                     done.seconds = interrupted = time.monotonic() - start
                     end_group(process.pid, signal.SIGINT)

@@ -20,13 +20,13 @@ class Tally:
     """Counts tries and failures.
 
     Attributes:
-        what: the name of what was tried, in the plural. tried, short: the numbers of tries and of
+        what: the name of what was tried, in the plural. tried, failed: the numbers of tries and of
             failures. seconds: the time that they took.
     """
 
     what: str
     tried: int = 0
-    short: int = 0
+    failed: int = 0
     seconds: float = 0.0
 
     def __add__(self, other: Tally) -> Tally:
@@ -34,28 +34,28 @@ class Tally:
         return Tally(
             self.what,
             self.tried + other.tried,
-            self.short + other.short,
+            self.failed + other.failed,
             self.seconds + other.seconds,
         )
 
     def __str__(self) -> str:
-        return f"{self.tried} {self.what} in {self.seconds:.0f} s: {self.short} failed"
+        return f"{self.tried} {self.what} in {self.seconds:.0f} s: {self.failed} failed"
 
 
 def tally(what: str, tries: Iterable[Try], say: Callable[[str], None] = click.echo) -> Tally:
     """Try all, and say each problem as soon as it is found."""
-    began, tried, short = time.monotonic(), 0, 0
+    began, tried, failed = time.monotonic(), 0, 0
     for name, problems in tries:
         tried += 1
         wrong = False
         for problem in problems:
             wrong = True
             say(f"{name}: {problem}")
-        short += wrong
-    return Tally(what, tried, short, time.monotonic() - began)
+        failed += wrong
+    return Tally(what, tried, failed, time.monotonic() - began)
 
 
-def holds(text: str, words: Sequence[str]) -> bool:
+def has_words(text: str, words: Sequence[str]) -> bool:
     """Whether a name has all words that were given to choose by."""
     return all(word in text for word in words)
 
@@ -85,4 +85,4 @@ def run_check(check: Check, doc: str | None) -> None:
 def end(done: Tally) -> None:
     """Print a tally, and end the script: with exit code 1 if something failed."""
     click.echo(done)
-    sys.exit(int(done.short > 0))
+    sys.exit(int(done.failed > 0))

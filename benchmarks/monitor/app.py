@@ -15,6 +15,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware.base import RequestResponseEndpoint
 
+from benchmarks.monitor.directories import Directories
 from benchmarks.monitor.pages.compare import ComparePages
 from benchmarks.monitor.pages.data import DataPages
 from benchmarks.monitor.pages.episodes import EpisodePages
@@ -23,8 +24,7 @@ from benchmarks.monitor.pages.play import PlayPages
 from benchmarks.monitor.pages.runs import RunPages
 from benchmarks.monitor.pages.static import StaticPages
 from benchmarks.monitor.pages.training import TrainingPages
-from benchmarks.monitor.places import Places
-from benchmarks.monitor.site import NothingThere, Site
+from benchmarks.monitor.site import NotFound, Site
 
 if TYPE_CHECKING:
     from benchmarks.vlm_run import VLMRun
@@ -61,7 +61,7 @@ def make_app(
         vlm_run: the run of a vision-language agent that a person watches, by its name; None for
             one without any options.
     """
-    site = Site(Places(roots if play is None else (*roots, play)))
+    site = Site(Directories(roots if play is None else (*roots, play)))
     closing = closing or threading.Event()
     playing = PlayPages(site, closing, play, vlm_run)
 
@@ -83,7 +83,7 @@ def make_app(
             response.headers.setdefault(name, value)
         return response
 
-    @app.exception_handler(NothingThere)
+    @app.exception_handler(NotFound)
     @app.exception_handler(404)
     async def gone(request: Request, error: Exception) -> Response:
         return await run_in_threadpool(site.show, request, "gone.html", {}, 404)

@@ -18,9 +18,9 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.followed import Followed
 from benchmarks.monitor.line_tail import LineFollower, Lines
-from benchmarks.monitor.places import Place
 from er_gym.data.collection import TRAJECTORIES
 from er_gym.data.paper_figures import ACTION, BEGIN
 from er_gym.data.statistics import Statistics
@@ -38,7 +38,7 @@ _MOST_KEPT = 16
 
 
 @dataclass(frozen=True, slots=True)
-class Head:
+class TrajectoryHead:
     """The fields of a trajectory that lists show.
 
     Attributes:
@@ -79,13 +79,13 @@ class CollectionIndex(LineFollower):
 
     longest = 64 * 2**20  # one with more bytes is damaged
 
-    heads: list[Head] = field(default_factory=list)
+    heads: list[TrajectoryHead] = field(default_factory=list)
     found: Statistics = field(default_factory=Statistics)
     lengths: Counter[int] = field(default_factory=Counter)
     damaged: int = 0
     _places: dict[str, int] = field(default_factory=dict)
 
-    def at(self, id: str) -> Head | None:
+    def at(self, id: str) -> TrajectoryHead | None:
         """The trajectory with an id; None if there is none."""
         place = self._places.get(id)
         return None if place is None else self.heads[place]
@@ -121,8 +121,10 @@ class CollectionIndex(LineFollower):
                 found.transitions[before][state] += 1
                 before = state
 
-    def _head(self, offset: int, told: Mapping[str, Any], turns: _Turns, learnt: int) -> Head:
-        return Head(
+    def _head(
+        self, offset: int, told: Mapping[str, Any], turns: _Turns, learnt: int
+    ) -> TrajectoryHead:
+        return TrajectoryHead(
             offset=offset,
             id=_text(told["id"]),
             part=_shared(told.get("part", "")),
@@ -199,12 +201,14 @@ class Collections(Followed[CollectionIndex]):
     """The collections that were looked at last; safe for threads."""
 
     def __init__(self) -> None:
-        super().__init__(lambda place: CollectionIndex(place.path / TRAJECTORIES), _MOST_KEPT)
+        super().__init__(
+            lambda directory: CollectionIndex(directory.path / TRAJECTORIES), _MOST_KEPT
+        )
         self._counts: dict[Path, tuple[tuple[int, int, int], int]] = {}
 
-    def count(self, place: Place) -> int | None:
+    def count(self, directory: Directory) -> int | None:
         """How many lines a collection has; None if there is no file (yet)."""
-        file = place.path / TRAJECTORIES
+        file = directory.path / TRAJECTORIES
         try:
             status = file.stat()
             state = status.st_ino, status.st_size, status.st_mtime_ns

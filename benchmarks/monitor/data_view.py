@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from benchmarks.monitor.charts import as_svg
-from benchmarks.monitor.collection_index import CollectionIndex, Head
+from benchmarks.monitor.collection_index import CollectionIndex, TrajectoryHead
 from benchmarks.monitor.flow import flow
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.listing import AddressFilter
@@ -19,7 +19,7 @@ from er_gym.data.trajectory import TAG_OF_KIND, THOUGHT_KINDS, PictureRecord, Tr
 from er_gym.rollout.records import EpisodeRecord, StepRecord
 from er_gym.tasks.verbs import INIT
 
-SORTS: Mapping[str, Callable[[Head], Any]] = {
+SORTS: Mapping[str, Callable[[TrajectoryHead], Any]] = {
     "order": lambda head: head.offset,
     "turns": lambda head: (head.turns, head.offset),
     "thoughts": lambda head: (head.thoughts, head.offset),
@@ -29,7 +29,7 @@ SORTS: Mapping[str, Callable[[Head], Any]] = {
 
 
 @dataclass(frozen=True)
-class DataFilter(AddressFilter[Head]):
+class DataFilter(AddressFilter[TrajectoryHead]):
     """Which trajectories of a collection are shown.
 
     Attributes:
@@ -37,7 +37,7 @@ class DataFilter(AddressFilter[Head]):
         refused: a code of the critic's; "" for any.
     """
 
-    sorts: ClassVar[Mapping[str, Callable[[Head], Any]]] = SORTS
+    sorts: ClassVar[Mapping[str, Callable[[TrajectoryHead], Any]]] = SORTS
 
     part: str = ""
     kind: str = ""
@@ -46,7 +46,7 @@ class DataFilter(AddressFilter[Head]):
     refused: str = ""
     sort: str = "order"
 
-    def takes(self, row: Head) -> bool:
+    def takes(self, row: TrajectoryHead) -> bool:
         """Whether a trajectory is shown."""
         exact = {
             "part": row.part,
@@ -58,7 +58,7 @@ class DataFilter(AddressFilter[Head]):
         return matches and (not self.refused or self.refused in row.refused)
 
 
-def outcome_of(head: Head) -> str:
+def outcome_of(head: TrajectoryHead) -> str:
     """``success`` or ``failure``."""
     return "success" if head.success else "failure"
 

@@ -100,7 +100,7 @@ def view_of(run: RunDirectory, key: str) -> EpisodeView:
         steps=steps,
         pictures=pictures,
         failure=failure_of(record),
-        success=CORRECTED.tally(record).success,
+        success=CORRECTED.count(record).success,
         tokens=conversation.prompt_tokens + conversation.completion_tokens if conversation else 0,
         cost=conversation.cost if conversation else 0.0,
         problem=problem,

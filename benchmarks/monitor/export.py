@@ -34,13 +34,13 @@ from markupsafe import Markup
 
 from agents.vlm.record import PictureRecord
 from benchmarks.monitor import formats
+from benchmarks.monitor.directories import Directories
 from benchmarks.monitor.episode_view import EpisodeView, StepView, picture_file, view_of
 from benchmarks.monitor.event_tail import EpisodeRow
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.listing import Page
 from benchmarks.monitor.pages.replays import PICTURE_KINDS, drawn_room, no_room
 from benchmarks.monitor.pages.runs import run_variables
-from benchmarks.monitor.places import Places
 from benchmarks.monitor.run_view import SORTS, Filter
 from benchmarks.monitor.site import Site
 from benchmarks.monitor.world import CannotReplay, Worlds
@@ -65,7 +65,7 @@ class CannotExport(ValueError):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ExportRequest:
     """What is exported.
 
     Attributes:
@@ -121,7 +121,9 @@ class Exported:
         return json.dumps({**values, "scene": row.scene, "text": text})
 
 
-def export(wanted: Wanted, tell: Callable[[int, int], None] = lambda done, of: None) -> Exported:
+def export(
+    wanted: ExportRequest, tell: Callable[[int, int], None] = lambda done, of: None
+) -> Exported:
     """Export a run.
 
     Args:
@@ -144,7 +146,7 @@ def export(wanted: Wanted, tell: Callable[[int, int], None] = lambda done, of: N
     return maker.exported
 
 
-def _check_place(wanted: Wanted) -> None:
+def _check_place(wanted: ExportRequest) -> None:
     out = wanted.out
     if not (out.exists() or out.is_symlink()):
         return
@@ -166,17 +168,17 @@ def _check_place(wanted: Wanted) -> None:
 class _Maker:
     """Makes the pages of an export."""
 
-    def __init__(self, wanted: Wanted) -> None:
-        places = Places([wanted.run])
+    def __init__(self, wanted: ExportRequest) -> None:
+        directories = Directories([wanted.run])
         root = wanted.run.resolve()
-        place = next((p for p in places.of_kind("run") if p.path == root), None)
-        if place is None:
+        directory = next((p for p in directories.of_kind("run") if p.path == root), None)
+        if directory is None:
             raise CannotExport(f"{wanted.run} holds no run.json; give the directory of a run")
-        self.wanted, self.place = wanted, place
-        self._site, self._worlds = Site(places), Worlds()
+        self.wanted, self.directory = wanted, directory
+        self._site, self._worlds = Site(directories), Worlds()
         self._words = Translator(wanted.language)
         self._run = RunDirectory.open(root)
-        with self._site.runs.use(place) as view:
+        with self._site.runs.use(directory) as view:
             unknown = wanted.filter.unknown_type(view.choices()["type"])
             if unknown:
                 raise CannotExport(unknown)
@@ -188,7 +190,7 @@ class _Maker:
 
     def list_page(self) -> OfflinePage:
         """The run's page with all rows."""
-        with self._site.runs.use(self.place) as view:
+        with self._site.runs.use(self.directory) as view:
             view.count_failures(float("inf"))
             variables = run_variables(view, Filter())
             every = view.chosen(Filter())
@@ -217,7 +219,7 @@ class _Maker:
             episode, contents = self._drawn(episode)
         addresses = [picture(n, *each) if each else None for n, each in enumerate(contents)]
         variables = {
-            "run": self._site.summary(self.place),
+            "run": self._site.summary(self.directory),
             "key": key,
             "episode": episode,
             "filter": Filter(),
@@ -249,7 +251,7 @@ class _Maker:
         def link(address: str) -> str | None:
             parts = urlsplit(address)
             parameters = dict(parse_qsl(parts.query))
-            if parts.path not in (f"/runs/{self.place.id}", "/"):
+            if parts.path not in (f"/runs/{self.directory.id}", "/"):
                 return other(parts.path, parameters)
             query = f"?{urlencode(parameters)}" if parameters or self.wanted.is_file else ""
             return query if self.wanted.is_file else f"{up}{INDEX}{query}"
@@ -270,7 +272,7 @@ class _Maker:
 
     def _pictures(self, episode: EpisodeView) -> Iterator[tuple[bytes, str] | None]:
         for each in episode.pictures:
-            file = picture_file(self.place.path, each)
+            file = picture_file(self.directory.path, each)
             kind = file.suffix.lower() if file else ""
             yield (file.read_bytes(), kind) if file and kind in PICTURE_KINDS else None
 

@@ -47,8 +47,8 @@ def failure_of(episode: EpisodeRecord) -> Failure | None:
         return "crashed"
     if episode.end_reason == GAVE_UP:
         return "gave up"
-    tally = CORRECTED.tally(episode)
-    if tally.success:
+    counted = CORRECTED.count(episode)
+    if counted.success:
         return None
     steps = [step for step in episode.steps if step.verb != INIT]
     unusable = sum(step.verb == ERROR for step in steps)
@@ -60,7 +60,7 @@ def failure_of(episode: EpisodeRecord) -> Failure | None:
         for key in episode.key_actions
         if key.verb not in (END, NAVIGATE, OBSERVE)
     ]
-    missing = Counter(tally.expected) - Counter(tally.scored)
+    missing = Counter(counted.expected) - Counter(counted.scored)
     missing.pop(END, None)
     if wanted and not Counter(wanted) - Counter(did):
         return "wrong order" if len(wanted) > 1 else "wrong object"

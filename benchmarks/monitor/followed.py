@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Generic, Protocol, TypeVar
 
-from benchmarks.monitor.places import Place
+from benchmarks.monitor.directories import Directory
 
 
 class Follower(Protocol):
@@ -29,21 +29,21 @@ class Followed(Generic[_Follower]):
         most: how many are kept; None for all.
     """
 
-    def __init__(self, follow: Callable[[Place], _Follower], most: int | None = None) -> None:
+    def __init__(self, follow: Callable[[Directory], _Follower], most: int | None = None) -> None:
         self._follow, self._most = follow, most
         self._lock = threading.Lock()
         self._kept: OrderedDict[str, tuple[_Follower, threading.Lock]] = OrderedDict()
 
     @contextmanager
-    def use(self, place: Place) -> Iterator[_Follower]:
+    def use(self, directory: Directory) -> Iterator[_Follower]:
         """A directory for a ``with`` block, up to date."""
         with self._lock:
-            if place.id not in self._kept:
-                self._kept[place.id] = self._follow(place), threading.Lock()
-            self._kept.move_to_end(place.id)
+            if directory.id not in self._kept:
+                self._kept[directory.id] = self._follow(directory), threading.Lock()
+            self._kept.move_to_end(directory.id)
             while self._most is not None and len(self._kept) > self._most:
                 self._kept.popitem(last=False)
-            follower, lock = self._kept[place.id]
+            follower, lock = self._kept[directory.id]
         with lock:
             follower.read()
             yield follower

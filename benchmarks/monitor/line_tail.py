@@ -20,14 +20,14 @@ class Lines:
         offset: of the first one's first byte in the file.
         text: the lines, each with its newline.
         passed_over: how many lines that stood before them were too long: 0 or 1.
-        anew: whether the file is another one than was read before, or the first; all that was
+        restarted: whether the file is another one than was read before, or the first; all that was
             known of it is void.
     """
 
     offset: int
     text: bytes = b""
     passed_over: int = 0
-    anew: bool = False
+    restarted: bool = False
 
     @property
     def lines(self) -> list[bytes]:
@@ -64,7 +64,7 @@ class LineTail:
                 if status.st_ino != self._inode or status.st_size < self._offset:
                     self._inode, self._offset = status.st_ino, 0
                     self._rest, self._too_long = b"", False
-                    yield Lines(0, anew=True)
+                    yield Lines(0, restarted=True)
                 file.seek(self._offset)
                 while chunk := file.read(min(_CHUNK, self.longest)):
                     yield self._whole(chunk)
@@ -105,7 +105,7 @@ class LineFollower(ABC):
     def read(self) -> None:
         """Read what has been added. A file that was replaced is read from its beginning."""
         for lines in self._tail.read():
-            if lines.anew:
+            if lines.restarted:
                 self._forget()
             self._take(lines)
 

@@ -13,10 +13,10 @@ import yaml
 from pydantic import ValidationError
 
 from benchmarks.monitor.charts import as_svg
-from benchmarks.monitor.growth import changed, in_use
+from benchmarks.monitor.directories import Directory
+from benchmarks.monitor.fingerprint import changed, in_use
 from benchmarks.monitor.language import Translator
-from benchmarks.monitor.places import Place
-from benchmarks.monitor.run_view import RunSummary, Tally
+from benchmarks.monitor.run_view import RunSummary, SuccessCount
 from benchmarks.scoring.metrics import Estimate
 from benchmarks.study.charts import Shown
 from benchmarks.study.kinds import KINDS, Study
@@ -29,10 +29,10 @@ from er_gym.tasks.reading import read_text
 class Inside(Protocol):
     """What is in a plan's directory."""
 
-    def place(self, out: str) -> Place | None:
+    def directory(self, out: str) -> Directory | None:
         """What is in a directory, relative to the plan's."""
 
-    def run(self, place: Place) -> tuple[RunSummary, Sequence[Tally]]:
+    def run(self, directory: Directory) -> tuple[RunSummary, Sequence[SuccessCount]]:
         """A run, and its success by group of tasks."""
 
 
@@ -44,14 +44,14 @@ class PhaseView:
         name: of the phase. command: as one would type it.
         state: ``finished``, ``running``, ``stopped`` or ``waiting``.
         seconds: how long it took; None until it is done.
-        place: the directory that it writes; None if there is none (yet).
+        directory: what it writes; None if there is none (yet).
     """
 
     name: str
     command: str
     state: str
     seconds: float | None
-    place: Place | None
+    directory: Directory | None
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,8 @@ class Measured:
     name: str
     faults: float
     runs: Sequence[RunSummary]
-    success: Tally
-    groups: Mapping[str, Tally]
+    success: SuccessCount
+    groups: Mapping[str, SuccessCount]
 
     @property
     def shown(self) -> Shown:
@@ -95,7 +95,7 @@ class PlanView:
     """A ladder or an ablation at a moment.
 
     Attributes:
-        place: its directory.
+        directory: where it is.
         state: ``running``, ``finished``, ``stopped`` or ``waiting``.
         phases: in order.
         settings: as YAML. description: in its own words.
@@ -103,7 +103,7 @@ class PlanView:
         changed: when a phase ended last, seconds since the epoch.
     """
 
-    place: Place
+    directory: Directory
     state: str
     phases: Sequence[PhaseView]
     settings: str
@@ -117,17 +117,17 @@ class PlanView:
         return sum(phase.state == "finished" for phase in self.phases)
 
 
-def plan_view(place: Place, inside: Inside) -> tuple[PlanView, Any]:
+def plan_view(directory: Directory, inside: Inside) -> tuple[PlanView, Any]:
     """A ladder or an ablation, and its settings; None if they cannot be read."""
-    kind = KINDS[place.kind]
-    file = place.path / f"{place.kind}.json"
+    kind = KINDS[directory.kind]
+    file = directory.path / f"{directory.kind}.json"
     settings, problem, record, phases = None, "", None, []
     try:
         record = PlanRecord.model_validate_json(read_text(file))
         settings = kind.settings.model_validate(record.settings)
         phases = [
             (each.name, str(each), each.out)
-            for each in Study(kind, place.path, settings).plan.phases
+            for each in Study(kind, directory.path, settings).plan.phases
         ]
     except ValidationError as error:
         problem = f"{file.name}: {first_problem(error)}"
@@ -136,29 +136,31 @@ def plan_view(place: Place, inside: Inside) -> tuple[PlanView, Any]:
     done = {each.name: each for each in record.done} if record else {}
     if not phases:  # another version's settings: what it has done can be shown all the same
         phases = [(name, " ".join(("er-gym", *each.command)), "") for name, each in done.items()]
-    working = in_use(place.path) or in_use(place.path / "running")
+    working = in_use(directory.path) or in_use(directory.path / "running")
     views, begun = [], False
     for name, command, out in phases:
         if name in done:
             state = "finished"
         elif not begun:
-            there = bool(out) and (place.path / out).exists()
+            there = bool(out) and (directory.path / out).exists()
             state, begun = "running" if working else "stopped" if there else "waiting", True
         else:
             state = "waiting"
         seconds = done[name].seconds if name in done else None
-        views.append(PhaseView(name, command, state, seconds, inside.place(out) if out else None))
+        views.append(
+            PhaseView(name, command, state, seconds, inside.directory(out) if out else None)
+        )
     finished = bool(views) and all(each.state == "finished" for each in views)
     state = "running" if working else "finished" if finished else "stopped" if done else "waiting"
     told = record.settings if record else {}
     view = PlanView(
-        place=place,
+        directory=directory,
         state=state,
         phases=views,
         settings=yaml.safe_dump(told, allow_unicode=True, sort_keys=False) if told else "",
         description=str(told.get("description", "")),
         problem=problem,
-        changed=changed(place),
+        changed=changed(directory),
     )
     return view, settings
 
@@ -177,21 +179,25 @@ def part_views(kind: str, settings: Any, inside: Inside, t: Translator) -> list[
 
 
 def _measured(of: Measurement, inside: Inside) -> Measured:
-    places = [inside.place(out) for out in of.runs.values()]
-    told = [inside.run(place) for place in places if place is not None and place.kind == "run"]
+    directories = [inside.directory(out) for out in of.runs.values()]
+    told = [
+        inside.run(directory)
+        for directory in directories
+        if directory is not None and directory.kind == "run"
+    ]
     runs = [summary for summary, _ in told]
-    by_group: dict[str, list[Tally]] = {}
+    by_group: dict[str, list[SuccessCount]] = {}
     for _, groups in told:
-        for tally in groups:
-            by_group.setdefault(tally.name, []).append(tally)
+        for count in groups:
+            by_group.setdefault(count.name, []).append(count)
     return Measured(
         name=of.name,
         faults=of.faults,
         runs=runs,
         success=_sum(of.name, [run.success for run in runs]),
-        groups={group: _sum(group, tallies) for group, tallies in by_group.items()},
+        groups={group: _sum(group, counts) for group, counts in by_group.items()},
     )
 
 
-def _sum(name: str, tallies: Sequence[Tally]) -> Tally:
-    return Tally.over(name, [result for each in tallies for result in each.results])
+def _sum(name: str, counts: Sequence[SuccessCount]) -> SuccessCount:
+    return SuccessCount.over(name, [result for each in counts for result in each.results])

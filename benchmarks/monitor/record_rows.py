@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from benchmarks.monitor.event_tail import EpisodeRow
-from benchmarks.monitor.growth import in_use
+from benchmarks.monitor.fingerprint import in_use
 from er_gym.rollout.causes import causes_in
 from er_gym.rollout.outcomes import succeeded
 from er_gym.rollout.records import EpisodeRecord

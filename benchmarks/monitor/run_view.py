@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.event_tail import EpisodeRow, EventTail
 from benchmarks.monitor.failure_counts import FailureCounts
 from benchmarks.monitor.followed import Followed
 from benchmarks.monitor.listing import AddressFilter
-from benchmarks.monitor.places import Place
 from benchmarks.monitor.record_rows import RecordRows
 from benchmarks.monitor.spending_tail import SpendingTail
 from benchmarks.scoring.metrics import success_rate
@@ -82,7 +82,7 @@ def _within(number: int, bounds: str) -> bool:
 
 
 @dataclass(frozen=True)
-class Tally:
+class SuccessCount:
     """A count of successes, as reports have it (:mod:`er_gym.rollout.outcomes`).
 
     Attributes:
@@ -108,19 +108,19 @@ class Tally:
         return sum(success for _, success in self.results)
 
     @staticmethod
-    def over(name: str, results: Sequence[tuple[str, bool]]) -> Tally:
+    def over(name: str, results: Sequence[tuple[str, bool]]) -> SuccessCount:
         """Count some results."""
         if not results:
-            return Tally(name)
+            return SuccessCount(name)
         tasks, successes = zip(*results, strict=True)
         estimate = success_rate(tasks, successes)
-        return Tally(name, results, estimate.mean, estimate.low, estimate.high)
+        return SuccessCount(name, results, estimate.mean, estimate.low, estimate.high)
 
     @staticmethod
-    def of(name: str, rows: Iterable[EpisodeRow]) -> Tally:
+    def of(name: str, rows: Iterable[EpisodeRow]) -> SuccessCount:
         """Count the episodes of a run."""
         told = [(row.key, row.result) for row in rows]
-        return Tally.over(
+        return SuccessCount.over(
             name, [(task_of_key(key), row.success) for key, row in told if row is not None]
         )
 
@@ -130,7 +130,7 @@ class RunSummary:
     """A run at a moment.
 
     Attributes:
-        place: its directory.
+        directory: where it is.
         manifest: what is played; None if that cannot be read, and ``problem`` says why.
         state: ``playing``, ``finished``, ``stopped`` or ``waiting``.
         wanted: how many episodes it is to have.
@@ -144,14 +144,14 @@ class RunSummary:
         version: changes when anything does.
     """
 
-    place: Place
+    directory: Directory
     manifest: Manifest | None
     problem: str
     state: str
     wanted: int
     finished: int
     counts: Mapping[str, int]
-    success: Tally
+    success: SuccessCount
     spent: Cost
     decisions_per_second: float
     seconds_left: float | None
@@ -164,11 +164,11 @@ class RunView:
     """A run, followed while it grows. One thread at a time may use it.
 
     Attributes:
-        place: its directory.
+        directory: where it is.
         failures: why its episodes failed.
     """
 
-    place: Place
+    directory: Directory
     failures: FailureCounts = field(default_factory=FailureCounts)
     _tail: EventTail = field(init=False)
     _records: RecordRows = field(init=False)
@@ -178,15 +178,15 @@ class RunView:
     _problem: str = ""
 
     def __post_init__(self) -> None:
-        self._tail = EventTail(self.place.path / EVENTS)
-        self._records = RecordRows(self.place.path)
-        self._spending = SpendingTail(self.place.path / SPENDING)
+        self._tail = EventTail(self.directory.path / EVENTS)
+        self._records = RecordRows(self.directory.path)
+        self._spending = SpendingTail(self.directory.path / SPENDING)
 
     def read(self) -> None:
         """Read what is new."""
         if self._manifest is None:
             try:
-                self._manifest = RunDirectory.open(self.place.path).manifest
+                self._manifest = RunDirectory.open(self.directory.path).manifest
                 self._problem = ""
             except (RunDirectoryError, OSError) as error:
                 self._problem = str(error)
@@ -197,7 +197,7 @@ class RunView:
     def count_failures(self, seconds: float) -> None:
         """Read why episodes failed, for a while."""
         try:
-            run = RunDirectory.open(self.place.path)
+            run = RunDirectory.open(self.directory.path)
         except (RunDirectoryError, OSError):
             return
         self.failures.read(run, self._rows, seconds)
@@ -227,14 +227,14 @@ class RunView:
         if state == "playing" and since and spent > 0:
             left = (wanted - finished) * spent / len(since)
         return RunSummary(
-            place=self.place,
+            directory=self.directory,
             manifest=self._manifest,
             problem=self._problem,
             state=state,
             wanted=wanted,
             finished=finished,
             counts=counts,
-            success=Tally.of("", rows),
+            success=SuccessCount.of("", rows),
             spent=self._spending.spent or _of_replies(rows),
             decisions_per_second=_speed(rows, tail.time),
             seconds_left=left,
@@ -251,7 +251,7 @@ class RunView:
         """The rows that a filter takes, sorted."""
         return filter.chosen(self._rows.values())
 
-    def tallies(self) -> tuple[list[Tally], list[Tally]]:
+    def success_counts(self) -> tuple[list[SuccessCount], list[SuccessCount]]:
         """Success by group and by task type, in the order of the paper's table."""
         by_type: dict[str, list[EpisodeRow]] = {}
         for row in self._rows.values():
@@ -260,8 +260,8 @@ class RunView:
         for name, rows in by_type.items():
             by_group.setdefault(_group(name), []).extend(rows)
         return (
-            [Tally.of(name, rows) for name, rows in by_group.items()],
-            [Tally.of(name, rows) for name, rows in sorted(by_type.items())],
+            [SuccessCount.of(name, rows) for name, rows in by_group.items()],
+            [SuccessCount.of(name, rows) for name, rows in sorted(by_type.items())],
         )
 
     def choices(self) -> dict[str, list[str]]:

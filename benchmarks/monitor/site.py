@@ -15,12 +15,12 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from benchmarks.monitor import formats, svg
+from benchmarks.monitor.directories import Directories, Directory, Kind
 from benchmarks.monitor.episode_view import MOST_TEXT
 from benchmarks.monitor.event_tail import EpisodeRow
 from benchmarks.monitor.failure_counts import FailureCounts
-from benchmarks.monitor.growth import growth
+from benchmarks.monitor.fingerprint import fingerprint
 from benchmarks.monitor.language import Translator, chosen_language
-from benchmarks.monitor.places import Kind, Place, Places
 from benchmarks.monitor.run_view import RunSummary, run_views
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import Manifest, RunDirectory
@@ -36,29 +36,29 @@ _COUNT_SECONDS = 0.3
 """How long failures are counted at a time, while a page waits for news."""
 
 
-class NothingThere(Exception):
+class NotFound(Exception):
     """There is nothing at this address."""
 
 
 @contextmanager
 def or_nothing() -> Iterator[None]:
-    """Within, what cannot be read is not there: raises :class:`NothingThere`."""
+    """Within, what cannot be read is not there: raises :class:`NotFound`."""
     try:
         yield
     except (ValueError, OSError):
-        raise NothingThere from None
+        raise NotFound from None
 
 
 class Site:
     """The directories, read while they grow, and pages made from templates.
 
     Attributes:
-        places: the directories.
+        directories: those that it shows.
         runs: what was read of those that are runs.
     """
 
-    def __init__(self, places: Places) -> None:
-        self.places = places
+    def __init__(self, directories: Directories) -> None:
+        self.directories = directories
         self.runs = run_views()
         self._templates = Environment(
             loader=PackageLoader("benchmarks.monitor", "templates"),
@@ -117,51 +117,51 @@ class Site:
         accepted = request.headers.get("accept-language", "")
         return Translator(chosen_language(request.cookies.get(LANGUAGE, ""), accepted))
 
-    def place(self, id: str, kind: Kind) -> Place:
+    def directory(self, id: str, kind: Kind) -> Directory:
         """The directory with an id.
 
         Raises:
-            NothingThere: there is none of this kind.
+            NotFound: there is none of this kind.
         """
-        place = self.places.get(id)
-        if place is None or place.kind != kind:
-            raise NothingThere
-        return place
+        directory = self.directories.get(id)
+        if directory is None or directory.kind != kind:
+            raise NotFound
+        return directory
 
-    def summary(self, place: Place) -> RunSummary:
+    def summary(self, directory: Directory) -> RunSummary:
         """A run at this moment."""
-        with self.runs.use(place) as view:
+        with self.runs.use(directory) as view:
             return view.summary()
 
     def read_runs(self, closing: threading.Event) -> None:
         """Read all runs, one after the other, until ``closing`` is set: pages that are asked for
         meanwhile wait for what is being read, and need not read it again."""
-        for place in self.places.of_kind("run"):
+        for directory in self.directories.of_kind("run"):
             if closing.is_set():
                 return
-            self.summary(place)
+            self.summary(directory)
 
-    def rows(self, place: Place) -> dict[str, EpisodeRow]:
+    def rows(self, directory: Directory) -> dict[str, EpisodeRow]:
         """A run's episodes by key."""
-        with self.runs.use(place) as view:
+        with self.runs.use(directory) as view:
             return dict(view.rows)
 
-    def failures(self, place: Place) -> FailureCounts:
+    def failures(self, directory: Directory) -> FailureCounts:
         """Why a run's episodes failed, as far as that has been counted."""
-        with self.runs.use(place) as view:
+        with self.runs.use(directory) as view:
             view.count_failures(_COUNT_SECONDS / 3)
             return deepcopy(view.failures)
 
-    def version(self, place: Place, closely: bool = False) -> object:
+    def version(self, directory: Directory, closely: bool = False) -> object:
         """What changes whenever a directory does.
 
         Args:
-            place: the directory.
+            directory: which.
             closely: whether a page shows it alone, and so why its episodes failed.
         """
-        if place.kind != "run":
-            return growth(place)
-        with self.runs.use(place) as view:
+        if directory.kind != "run":
+            return fingerprint(directory)
+        with self.runs.use(directory) as view:
             if closely:
                 view.count_failures(_COUNT_SECONDS)
             summary = view.summary()
@@ -171,8 +171,8 @@ class Site:
         """An episode's record, and its run's manifest.
 
         Raises:
-            NothingThere: there is none.
+            NotFound: there is none.
         """
         with or_nothing():
-            run = RunDirectory.open(self.place(id, "run").path)
+            run = RunDirectory.open(self.directory(id, "run").path)
             return run.episode(key), run.manifest

@@ -12,10 +12,10 @@ import yaml
 
 from benchmarks.monitor.charts import as_svg
 from benchmarks.monitor.curve_tail import CurveTail, last_line
+from benchmarks.monitor.directories import Directory
+from benchmarks.monitor.fingerprint import changed, in_use
 from benchmarks.monitor.followed import Followed
-from benchmarks.monitor.growth import changed, in_use
 from benchmarks.monitor.language import Translator
-from benchmarks.monitor.places import Place
 from benchmarks.scoring.series import Axis, Chart, Series
 from er_gym.tasks.errors import TaskFileError
 from er_gym.tasks.reading import parse_json, read_text, read_yaml
@@ -35,7 +35,7 @@ class Trained:
     """A training run at a moment.
 
     Attributes:
-        place: its directory.
+        directory: where it is.
         state: ``running``, ``finished``, ``stopped`` or ``waiting``.
         done, wanted: steps or updates; ``wanted`` is None where it cannot be known.
         last: of each figure the last value.
@@ -45,7 +45,7 @@ class Trained:
         changed: when it changed last, seconds since the epoch.
     """
 
-    place: Place
+    directory: Directory
     state: str
     done: int
     wanted: int | None
@@ -66,41 +66,43 @@ class Trained:
         return [(k.removeprefix(_TYPES), v) for k, v in self.last.items() if k.startswith(_TYPES)]
 
 
-def trained(place: Place, last: Mapping[str, Any] | None = None) -> Trained:
+def trained(directory: Directory, last: Mapping[str, Any] | None = None) -> Trained:
     """A training run of the kind ``policy`` or ``finetuning``.
 
     Args:
-        place: its directory.
+        directory: where it is.
         last: of each figure the last value; None to look them up in the last line of the log.
     """
-    last = last_line(place.path / _LOG[place.kind]) if last is None else last
-    done = last.get(_OVER[place.kind], 0)
+    last = last_line(directory.path / _LOG[directory.kind]) if last is None else last
+    done = last.get(_OVER[directory.kind], 0)
     done = int(done) if isinstance(done, (int, float)) else 0
-    settings, problem = _settings(place)
-    wanted, about = _told(place, settings, done, last)
+    settings, problem = _settings(directory)
+    wanted, about = _told(directory, settings, done, last)
     finished = (
-        done >= wanted if place.kind == "policy" and wanted else (place.path / "model").is_dir()
+        done >= wanted
+        if directory.kind == "policy" and wanted
+        else (directory.path / "model").is_dir()
     )
-    state = _state(place, done, bool(finished))
+    state = _state(directory, done, bool(finished))
     return Trained(
-        place=place,
+        directory=directory,
         state=state,
         done=done,
-        wanted=done if state == "finished" and place.kind == "finetuning" else wanted,
+        wanted=done if state == "finished" and directory.kind == "finetuning" else wanted,
         last=last,
         settings=yaml.safe_dump(settings, allow_unicode=True, sort_keys=False) if settings else "",
         problem=problem,
         about=about,
-        changed=changed(place),
+        changed=changed(directory),
     )
 
 
-def _state(place: Place, done: int, finished: bool) -> str:
-    if in_use(place.path):
+def _state(directory: Directory, done: int, finished: bool) -> str:
+    if in_use(directory.path):
         return "running"
     if finished:
         return "finished"
-    if done and time.time() - _written(place.path / _LOG[place.kind]) < _FRESH_SECONDS:
+    if done and time.time() - _written(directory.path / _LOG[directory.kind]) < _FRESH_SECONDS:
         return "running"
     return "stopped" if done else "waiting"
 
@@ -112,13 +114,13 @@ def _written(file: Path) -> float:
         return 0.0
 
 
-def _settings(place: Place) -> tuple[dict[str, Any], str]:
+def _settings(directory: Directory) -> tuple[dict[str, Any], str]:
     """The settings, and why they cannot be read."""
     try:
-        if place.kind == "policy":
-            told = read_yaml(place.path / "config.yaml")
+        if directory.kind == "policy":
+            told = read_yaml(directory.path / "config.yaml")
         else:
-            file = place.path / "finetune.json"
+            file = directory.path / "finetune.json"
             told = parse_json(read_text(file), file)
             if isinstance(told, dict):
                 told = {key: told.get(key) for key in ("model", "data", "settings")}
@@ -128,11 +130,11 @@ def _settings(place: Place) -> tuple[dict[str, Any], str]:
 
 
 def _told(
-    place: Place, settings: Mapping[str, Any], done: int, last: Mapping[str, Any]
+    directory: Directory, settings: Mapping[str, Any], done: int, last: Mapping[str, Any]
 ) -> tuple[int | None, str]:
     """How many steps or updates are wanted, and what a list says of the run."""
     try:
-        if place.kind == "policy":
+        if directory.kind == "policy":
             name = str(settings["algorithm"]["name"])
             types = ", ".join(map(str, settings["env"]["types"]))
             return int(settings["total_steps"]), " · ".join(filter(None, (name, types)))
@@ -194,5 +196,6 @@ def finetuning_charts(tail: CurveTail, t: Translator) -> list[tuple[str, Any]]:
 def curves() -> Followed[CurveTail]:
     """The curves of the runs that were looked at last."""
     return Followed(
-        lambda place: CurveTail(place.path / _LOG[place.kind], _OVER[place.kind]), _MOST_KEPT
+        lambda directory: CurveTail(directory.path / _LOG[directory.kind], _OVER[directory.kind]),
+        _MOST_KEPT,
     )

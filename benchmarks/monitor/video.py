@@ -17,7 +17,7 @@ from benchmarks.monitor.formats import visible
 from benchmarks.monitor.world import CannotReplay, Worlds
 from er_gym.data.fonts import Font, NoFont, font_for
 from er_gym.data.pictures import UnusablePicture, open_picture
-from er_gym.data.strips import fold
+from er_gym.data.strips import wrap_text
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.tasks.verbs import INIT
 
@@ -189,7 +189,7 @@ def _frame(
     page.paste(picture, (0, 0))
     pen = ImageDraw.Draw(page)
     top, wide = _HEIGHT + _MARGIN, _WIDTH - 2 * _MARGIN
-    task = fold(visible(record.instruction, 500), fonts["small"], wide - 60)
+    task = wrap_text(visible(record.instruction, 500), fonts["small"], wide - 60)
     pen.text((_MARGIN, top), _cut(task, 1)[0], _MUTED, fonts["small"])
     number = f"{step.number if step else total} / {total}"
     pen.text((_WIDTH - _MARGIN, top), number, _MUTED, fonts["small"], anchor="ra")
@@ -203,7 +203,7 @@ def _frame(
     mark = "✓" if good else "✗"
     pen.text((_MARGIN, top), f"→ {did}  {mark}{reward}", _DONE if good else _FAILED, fonts["text"])
     top += line
-    for text in _cut(fold(thought, fonts["text"], wide), _LINES) if thought else ():
+    for text in _cut(wrap_text(thought, fonts["text"], wide), _LINES) if thought else ():
         pen.text((_MARGIN, top), text, _INK, fonts["text"])
         top += line
     seconds = _LAST if step is None else _FASTEST + len(thought) / _LETTERS_PER_SECOND

@@ -31,14 +31,14 @@ from benchmarks.harness.measuring import in_turns, timed
 from er_gym import __version__
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.cluster.actors import resident_memory
-from er_gym.rollout.cluster.session import ray_machines
+from er_gym.rollout.cluster.session import ray_backend
 from er_gym.rollout.cluster.settings import RaySettings
 from er_gym.rollout.events import read_events
 from er_gym.rollout.executor import Parallelism
-from er_gym.rollout.machines import THIS_MACHINE, Machines
 from er_gym.rollout.play import play_episode
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.rollout.runner import run
+from er_gym.rollout.worker_backend import LOCAL_BACKEND, WorkerBackend
 from er_gym.tasks import load_suite
 
 _KINDS = ("driver", "actors", "memory")
@@ -73,8 +73,8 @@ def main(kinds: Sequence[str], episodes: int, picture_episodes: int, rounds: int
 
 def _driver() -> None:
     for seconds, workers, jobs in ((0.002, 4, 20_000), (0.2, 64, 6_400)):
-        with ray_machines(RaySettings(cpus=0.01, memory=2**28), print) as machines:
-            spent = _time(machines, seconds, jobs, workers)
+        with ray_backend(RaySettings(cpus=0.01, memory=2**28), print) as worker_backend:
+            spent = _time(worker_backend, seconds, jobs, workers)
             ideal = jobs * seconds / workers
             print(
                 f"{workers} workers, {jobs:,} jobs of {1000 * seconds:g} ms: {jobs / spent:,.0f} "
@@ -82,10 +82,10 @@ def _driver() -> None:
             )
 
 
-def _time(machines: Machines, seconds: float, jobs: int, workers: int) -> float:
+def _time(worker_backend: WorkerBackend, seconds: float, jobs: int, workers: int) -> float:
     """Seconds for so many jobs, from the moment when all workers have done one."""
     all_jobs = range(jobs + 100_000)
-    results = machines.run_jobs(partial(Nap, seconds), all_jobs, workers=workers)
+    results = worker_backend.run_jobs(partial(Nap, seconds), all_jobs, workers=workers)
     with closing(results):
         at_work: set[int] = set()
         while len(at_work) < workers:
@@ -102,10 +102,10 @@ def _process(result: tuple[int, Any]) -> int:
 
 
 def _memory() -> None:
-    with ray_machines(RaySettings(cpus=0.01, memory=2**28), print) as machines:
+    with ray_backend(RaySettings(cpus=0.01, memory=2**28), print) as worker_backend:
         told = []
         for done, _ in enumerate(
-            machines.run_jobs(partial(Nap, 0.0), range(50_000), workers=2), start=1
+            worker_backend.run_jobs(partial(Nap, 0.0), range(50_000), workers=2), start=1
         ):
             if done % 10_000 == 0:
                 told.append(f"{resident_memory() / 2**20:.0f}")
@@ -118,12 +118,12 @@ def _actors(episodes: int, picture_episodes: int, rounds: int) -> None:
         ("state", "text", episodes),
         ("pictures", "rgb+text", picture_episodes),
     )
-    with ray_machines(RaySettings(), print) as ray:
+    with ray_backend(RaySettings(), print) as ray:
         for name, obs_mode, number in kinds:
             tasks = suite.tasks[:: max(1, len(suite.tasks) // number)][:number]
             ways = {
-                "two processes": partial(_play, tasks, obs_mode, THIS_MACHINE, 2),
-                "one process": partial(_play, tasks, obs_mode, THIS_MACHINE, 1),
+                "two processes": partial(_play, tasks, obs_mode, LOCAL_BACKEND, 2),
+                "one process": partial(_play, tasks, obs_mode, LOCAL_BACKEND, 1),
                 "two actors": partial(_play, tasks, obs_mode, ray, 2),
                 "one actor": partial(_play, tasks, obs_mode, ray, 1),
             }
@@ -169,7 +169,7 @@ def _middle_rate(ended: Sequence[float]) -> float:
 
 
 def _play(
-    tasks: Sequence[Any], obs_mode: str, machines: Machines, workers: int
+    tasks: Sequence[Any], obs_mode: str, worker_backend: WorkerBackend, workers: int
 ) -> tuple[float, float]:
     """Seconds of a run; and episodes a second in its middle half, when all workers play."""
     manifest = Manifest(
@@ -183,7 +183,7 @@ def _play(
     )
     with tempfile.TemporaryDirectory() as folder:
         directory = RunDirectory.create(Path(folder) / "run", manifest)
-        size = replace(Parallelism(workers), machines=machines)
+        size = replace(Parallelism(workers), worker_backend=worker_backend)
         play = partial(run, directory, tasks, NamedAgent("oracle"), parallelism=size)
         spent = timed(play).clock
         ended = [event.time for event in read_events(directory.path, ["episode_ended"])]

@@ -27,8 +27,8 @@ import transformers
 from torch.profiler import ProfilerActivity, profile
 
 from agents.finetune.architecture import Architecture
-from agents.finetune.batches import Order
-from agents.finetune.memory import ModelNumbers, numbers_of
+from agents.finetune.batches import EpochSampler
+from agents.finetune.memory import ModelDimensions, dimensions_of
 from agents.finetune.new_model import make_model
 from agents.finetune.samples import open_samples
 from agents.finetune.settings import DataSettings, load_settings
@@ -77,7 +77,7 @@ def architecture(hidden: int, layers: int, words: int) -> Architecture:
     )
 
 
-def work_of(model: ModelNumbers, chats: list[EncodedChat]) -> float:
+def work_of(model: ModelDimensions, chats: list[EncodedChat]) -> float:
     """Additions and multiplications of one pass over the conversations, forward and backward."""
     found = 0.0
     for chat in chats:
@@ -88,7 +88,7 @@ def work_of(model: ModelNumbers, chats: list[EncodedChat]) -> float:
     return found
 
 
-def products(model: ModelNumbers, rows: int) -> tuple[float, Callable[[], None]]:
+def products(model: ModelDimensions, rows: int) -> tuple[float, Callable[[], None]]:
     """All products of the model's layers for so many tokens, forward and backward, and nothing
     else; returns their work, too."""
     h, wide, q, k = model.hidden, model.intermediate, model.attended, model.keys
@@ -151,7 +151,7 @@ def main(
         ])  # fmt: skip
         encoder = Encoder(tokenizer, tokenizer.chat_template, None, None, settings.data)
         chats = [encoder.encode(chat) for chat in samples.chats]
-        model = numbers_of(transformers.AutoConfig.from_pretrained(folder / "model").to_dict())
+        model = dimensions_of(transformers.AutoConfig.from_pretrained(folder / "model").to_dict())
         work = work_of(model, chats)
         number = iter(range(1_000))
 
@@ -184,7 +184,7 @@ def main(
         every = [one_round() for _ in range(rounds)]
         with profile(activities=[ProfilerActivity.CPU]) as seen:
             learn(epochs)
-    order = list(Order([chat.length for chat in chats], batch, 0, buckets=True))
+    order = list(EpochSampler([chat.length for chat in chats], batch, 0, buckets=True))
     batches = [
         [chats[i].length for i in order[at : at + batch]] for at in range(0, len(order), batch)
     ]

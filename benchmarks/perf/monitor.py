@@ -25,7 +25,7 @@ from PIL import Image
 
 from benchmarks.harness.measuring import timed
 from benchmarks.harness.processes import ER_GYM
-from benchmarks.monitor.places import Places
+from benchmarks.monitor.directories import Directories
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import CONVERSATIONS, PICTURES, Manifest, RunDirectory
 from er_gym.writing import file_stem
@@ -140,8 +140,8 @@ def measure(run: Path, keys: list[str], pictures: int) -> None:
         assert server.stdout is not None
         address = server.stdout.readline().strip()
         _tell("the server starts", [time.perf_counter() - begin])
-        (place,) = Places([run.parent]).all()
-        here = f"{address}runs/{place.id}"
+        (directory,) = Directories([run.parent]).all()
+        here = f"{address}runs/{directory.id}"
         some = [urllib.parse.quote(keys[k * len(keys) // _TIMES]) for k in range(_TIMES)]
         _tell("the first page", [_seconds(address)])
         _tell("the first page again", [_seconds(address) for _ in some])

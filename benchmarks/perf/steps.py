@@ -201,7 +201,7 @@ def fresh_start(rounds: int) -> list[Measurement]:
     return figures
 
 
-def resident_memory() -> list[Measurement]:
+def environment_memory() -> list[Measurement]:
     """The memory of a new process with one environment after 50 steps."""
     figures = []
     for obs_mode in ("state", "rgb"):
@@ -235,7 +235,7 @@ def main(seconds: float, rounds: int, file: Path | None) -> None:
     """Measure, and print one table."""
     figures = step_rates(rounds, seconds)
     figures.append(interactable_poses(rounds))
-    figures += fresh_start(rounds) + resident_memory()
+    figures += fresh_start(rounds) + environment_memory()
     show(figures)
     write_figures(file, [asdict(figure) for figure in figures])
 

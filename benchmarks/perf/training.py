@@ -24,7 +24,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor
 from agents.rl.callbacks import TorchThreads
 from agents.rl.config import PPO, TrainConfig, config_file, load_config
 from agents.rl.policy import make
-from agents.rl.train import fast_arithmetic, make_vec_env
+from agents.rl.train import make_vec_env, training_speedups
 
 
 @dataclass
@@ -137,7 +137,7 @@ def main(config: str, steps: int, peer_steps: int, overrides: tuple[str, ...]) -
         raise click.BadParameter(
             f"{config} uses {asked.algorithm.name}; give a configuration of ppo"
         )
-    with fast_arithmetic():
+    with training_speedups():
         show(config, *ours(asked, steps), steps)
         show("PPO on MiniGrid", *minigrid(asked, peer_steps), peer_steps)
 

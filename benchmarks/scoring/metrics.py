@@ -3,7 +3,7 @@
 The definitions are those of the Embodied-Reasoner benchmark (arXiv 2503.21696) as its released
 program computes them, so the numbers compare with its table. A scorer
 (:mod:`benchmarks.scoring.scorers`) walks through an episode once. Every metric is one small
-function of its tally and the episode. :func:`score_episode` puts them side by side, and
+function of its counts and the episode. :func:`score_episode` puts them side by side, and
 :func:`summarise` takes their means.
 """
 
@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from benchmarks.scoring.samples import effective_number, most_samples, variance_between
-from benchmarks.scoring.scorers import JUDGED_BY_NAME, Scorer, Tally
+from benchmarks.scoring.scorers import JUDGED_BY_NAME, KeyActionCounts, Scorer
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks.types import task_type
 from er_gym.tasks.verbs import END, NAVIGATE
@@ -23,7 +23,7 @@ from er_gym.tasks.verbs import END, NAVIGATE
 _Z = 1.959963984540054  # the 97.5 % point of the normal distribution
 
 
-def completeness(counted: Tally) -> float:
+def completeness(counted: KeyActionCounts) -> float:
     """The share of the scoring key actions that were done; whether it succeeded if it has none.
 
     An ``end`` is done where the scorer says so: to the judge, only an ``end`` that is a success.
@@ -34,7 +34,7 @@ def completeness(counted: Tally) -> float:
     return counted.points / len(counted.expected)
 
 
-def search_efficiency(episode: EpisodeRecord, counted: Tally) -> float:
+def search_efficiency(episode: EpisodeRecord, counted: KeyActionCounts) -> float:
     """(key actions + 1) / steps for a success, else 0.
 
     Navigations and ``end`` are among the key actions; ``init``, the one more, and ``end`` are among
@@ -43,7 +43,7 @@ def search_efficiency(episode: EpisodeRecord, counted: Tally) -> float:
     return (len(episode.key_actions) + 1) / counted.steps if counted.success else 0.0
 
 
-def ordered_completeness(episode: EpisodeRecord, counted: Tally) -> float:
+def ordered_completeness(episode: EpisodeRecord, counted: KeyActionCounts) -> float:
     """The longest common subsequence of done and expected, over expected.
 
     A ``single_search`` has nothing to order: its completeness.
@@ -53,7 +53,7 @@ def ordered_completeness(episode: EpisodeRecord, counted: Tally) -> float:
     return _longest_common(counted.scored, counted.expected) / len(counted.expected)
 
 
-def repeat_rate(counted: Tally) -> float:
+def repeat_rate(counted: KeyActionCounts) -> float:
     """The share of navigations, failed ones too, that name a type navigated to before."""
     return _share_repeated(counted.navigated_to)
 
@@ -81,7 +81,7 @@ def steps_saved(episode: EpisodeRecord) -> float:
     return max(episode.max_steps - episode.num_steps, 0) / episode.max_steps
 
 
-def key_action_precision(episode: EpisodeRecord, counted: Tally) -> float:
+def key_action_precision(episode: EpisodeRecord, counted: KeyActionCounts) -> float:
     """Key actions done, navigations among them, over actions predicted (``init`` is none).
 
     The completeness of the paper's text; its scorer computes :func:`completeness`.
@@ -108,7 +108,7 @@ class Score:
 
     Attributes:
         task_id, task_type, group: what was played.
-        success: the tally's; also where the paper's program gives more than 1, as it does in a task
+        success: as counted; also where the paper's program gives more than 1, as it does in a task
             whose only other key action was done and that does not ask for ``end``.
         missing: the scoring key actions that were not done, as ``"verb Type"``.
         sample: which of the task's episodes it is, from 1.
@@ -144,7 +144,7 @@ METRICS = (
 
 def score_episode(episode: EpisodeRecord, scorer: Scorer) -> Score:
     """All metrics of one episode."""
-    counted = scorer.tally(episode)
+    counted = scorer.count(episode)
     missing = Counter(counted.expected) - Counter(counted.scored)
     if counted.points > len(counted.scored):
         missing.pop(END, None)

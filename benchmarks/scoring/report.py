@@ -18,7 +18,7 @@ from benchmarks.scoring.metrics import (
     summarise,
     summarise_by,
 )
-from benchmarks.scoring.samples import TaskSamples, by, most_samples, task_samples
+from benchmarks.scoring.samples import TaskSamples, group_by, most_samples, task_samples
 from benchmarks.scoring.scorers import CORRECTED, PAPER, SCORERS
 from er_gym.rollout.causes import CauseCount, causes_in, count_causes
 from er_gym.rollout.judgement import lacks_search_targets
@@ -163,7 +163,8 @@ def _miss(episode: EpisodeRecord, scored: Score) -> Miss:
 def _parts(scores: Sequence[Score]) -> list[tuple[str, str, Sequence[Score]]]:
     """(level, name, scores) overall, for each group and for each task type that was played, in the
     order of the paper's table and of the table of task types."""
-    groups, types = by(scores, lambda each: each.group), by(scores, lambda each: each.task_type)
+    groups = group_by(scores, lambda each: each.group)
+    types = group_by(scores, lambda each: each.task_type)
     return [
         *([("overall", "all", scores)] if scores else []),
         *(("group", name, groups[name]) for name in GROUPS if name in groups),

@@ -122,7 +122,7 @@ def doubling(most: int) -> list[int]:
     return [*steps, most]
 
 
-def by(scores: Iterable[T], key: Callable[[T], str]) -> dict[str, list[T]]:
+def group_by(scores: Iterable[T], key: Callable[[T], str]) -> dict[str, list[T]]:
     """The scores with each value of ``key``."""
     parts: defaultdict[str, list[T]] = defaultdict(list)
     for each in scores:

@@ -5,8 +5,8 @@
 * ``corrected`` asks the judge of the environment (:mod:`er_gym.tasks.judge`) again, from the
   episode's record. Success and key actions done are what the environment said.
 
-A scorer walks through an episode once and returns a :class:`Tally`; the metrics
-(:mod:`benchmarks.scoring.metrics`) are functions of the tally and the episode.
+A scorer walks through an episode once and returns a :class:`KeyActionCounts`; the metrics
+(:mod:`benchmarks.scoring.metrics`) are functions of the counts and the episode.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ JUDGED_BY_NAME = "single_search"
 
 
 @dataclass(frozen=True)
-class Tally:
-    """The walk through an episode.
+class KeyActionCounts:
+    """What a walk through an episode counts.
 
     Attributes:
         expected: the key actions that score, as ``"verb Type"``, in the order of the task.
@@ -59,9 +59,9 @@ class Scorer:
     """
 
     name: str
-    walk: Callable[[EpisodeRecord], Tally]
+    walk: Callable[[EpisodeRecord], KeyActionCounts]
 
-    def tally(self, episode: EpisodeRecord) -> Tally:
+    def count(self, episode: EpisodeRecord) -> KeyActionCounts:
         """What was done; an episode that crashed is no success (:mod:`er_gym.rollout.outcomes`)."""
         counted = self.walk(episode)
         return replace(counted, success=succeeded(counted.success, episode.error))
@@ -85,7 +85,7 @@ def _label(verb: str, object_type: str) -> str:
     return f"{verb} {object_type}".rstrip()
 
 
-def _paper(episode: EpisodeRecord) -> Tally:
+def _paper(episode: EpisodeRecord) -> KeyActionCounts:
     """Count as the paper's program does.
 
     It reads types from the task's file alone: no step matches a key action whose type the file
@@ -127,7 +127,7 @@ def _paper(episode: EpisodeRecord) -> Tally:
                 scored.append(label)
                 points += 1
         last = label
-    return Tally(
+    return KeyActionCounts(
         tuple(expected),
         tuple(scored),
         points,
@@ -141,7 +141,7 @@ def _paper(episode: EpisodeRecord) -> Tally:
 # -- corrected -------------------------------------------------------------------------------------
 
 
-def _corrected(episode: EpisodeRecord) -> Tally:
+def _corrected(episode: EpisodeRecord) -> KeyActionCounts:
     """Count by the judge's verdict."""
     progress = judged(episode)
     named = progress.criteria.named
@@ -156,7 +156,7 @@ def _corrected(episode: EpisodeRecord) -> Tally:
         )
 
     scored = labels(progress.done)
-    return Tally(
+    return KeyActionCounts(
         expected=labels(progress.criteria.key_actions),
         scored=scored,
         points=len(scored),

@@ -15,7 +15,7 @@ from rich.text import Text
 from benchmarks.scoring.metrics import METRICS, Estimate, Score
 from benchmarks.scoring.report import BOTH, RunReport, by_group, sample_slices, slices
 from benchmarks.scoring.samples import most_samples
-from benchmarks.terminal import plain
+from benchmarks.terminal import without_control_codes
 from er_gym.envs.protocol import DEFAULT
 from er_gym.tables import Table
 from er_gym.tasks.types import BY_NAME, GROUPS
@@ -277,8 +277,8 @@ def print_tables(found: Sequence[Table], console: Console) -> None:
 
 def _plain(table: Table) -> Table:
     """The table as it is shown, so that columns are as wide as their words."""
-    rows = tuple(tuple(map(plain, row)) for row in table.rows)
-    return replace(table, head=tuple(map(plain, table.head)), rows=rows)
+    rows = tuple(tuple(map(without_control_codes, row)) for row in table.rows)
+    return replace(table, head=tuple(map(without_control_codes, table.head)), rows=rows)
 
 
 def _turned(table: Table) -> Table:

@@ -34,7 +34,7 @@ class _Ablation:
                 yield make.collect(out, out, source.collect)
             elif source.teacher is not None:
                 run = f"samples/{name}"
-                yield from make.teach((run, out), run, out, source.teacher)
+                yield from make.collect_from_teacher((run, out), run, out, source.teacher)
         for seed in settings.seeds:
             dialects = (row.dialect or settings.dialect for row in settings.rows.values())
             for dialect in dict.fromkeys(dialects):

@@ -6,7 +6,13 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from benchmarks.study.settings import Collected, Evaluation, PlaySettings, StrictSettings, Taught
+from agents.configs import StrictSettings
+from benchmarks.study.settings import (
+    Collected,
+    Evaluation,
+    PlaySettings,
+    TeacherData,
+)
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 +,.-]*$")]
 """Names of rows and the like are also names of directories."""
@@ -21,7 +27,7 @@ class Source(StrictSettings):
     """
 
     collect: Collected | None = None
-    teacher: Taught | None = None
+    teacher: TeacherData | None = None
 
     @model_validator(mode="after")
     def _one(self) -> Source:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from benchmarks.study import checks
 from benchmarks.study.phase import Phase
-from benchmarks.study.settings import Collected, PlaySettings, Taught
+from benchmarks.study.settings import Collected, PlaySettings, TeacherData
 
 
 @dataclass(frozen=True)
@@ -50,24 +50,26 @@ class Commands:
             ),
         )
 
-    def teach(self, names: tuple[str, str], run: str, out: str, taught: Taught) -> list[Phase]:
+    def collect_from_teacher(
+        self, names: tuple[str, str], run: str, out: str, teacher: TeacherData
+    ) -> list[Phase]:
         """The phases in which another agent plays and its successes are collected.
 
         Args:
             names: of the two phases.
             run: its run directory.
             out: the collection's.
-            taught: who plays what.
+            teacher: who plays what.
         """
         played = self.bench(
             names[0],
             run,
-            taught.agent,
+            teacher.agent,
             self.settings.suite,
-            taught.tasks,
-            faults=taught.faults,
-            samples=taught.samples,
-            skip=taught.skip,
+            teacher.tasks,
+            faults=teacher.faults,
+            samples=teacher.samples,
+            skip=teacher.skip,
         )
         return [
             played,
@@ -75,8 +77,8 @@ class Commands:
                 names[1],
                 out,
                 *("collect", "--select", self.at(run), "--balance", "none"),
-                *(("--keep-failed",) if taught.faults else ()),
-                *self.collecting(taught.limit),
+                *(("--keep-failed",) if teacher.faults else ()),
+                *self.collecting(teacher.limit),
             ),
         ]
 

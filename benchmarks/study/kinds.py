@@ -103,7 +103,7 @@ class Study:
     def write(self, found: Sequence[tuple[Part, list[Result]]]) -> list[Path]:
         """Write the tables and the figures of results into the directory: the files."""
         told: dict[str, Any] = {"format": f"er-gym/{self.kind.name}-result/1"}
-        rows = {part.name: [each.told() for each in results] for part, results in found}
+        rows = {part.name: [each.as_dict() for each in results] for part, results in found}
         told |= {"studies": rows} if self.kind is ABLATION else {"rungs": rows["ladder"]}
         tables = [table for part, results in found for table in part.tables(results)]
         files = [self.path / "result.md", self.path / "result.json"]

@@ -37,8 +37,8 @@ def compared(results: Sequence[Result]) -> list[Result]:
     """The rungs with their differences, each paired over tasks.
 
     ``gain``: in success to the rung before, of a control to the last rung. ``change``: with faults,
-    in success to the same rung without them. ``spared``: how much smaller a loss that is than the
-    rung's before. ``more_repeats``, ``more_revisits``: in
+    in success to the same rung without them. ``loss_reduction``: how much smaller a loss that is
+    than the rung's before. ``more_repeats``, ``more_revisits``: in
     :func:`~benchmarks.scoring.metrics.repeat_rate` and ``revisit_rate`` to the first stage measured
     with as many faults.
     """
@@ -55,14 +55,14 @@ def compared(results: Sequence[Result]) -> list[Result]:
         differences = {
             "gain": _difference(before.get(faults), each),
             "change": _difference(plain, each),
-            "spared": None,
+            "loss_reduction": None,
             "more_repeats": _difference(first, each, "repeat_rate"),
             "more_revisits": _difference(first, each, "revisit_rate"),
         }
         if plain is not None:
             if faults in lost:
                 earlier, later = lost[faults]
-                differences["spared"] = paired_change(
+                differences["loss_reduction"] = paired_change(
                     (earlier.scores(), later.scores()), (plain.scores(), each.scores())
                 )
             lost[faults] = plain, each
@@ -95,10 +95,10 @@ def ladder_tables(results: Sequence[Result]) -> list[Table]:
     )
     with_faults = results_table(
         "What faults cost, in %",
-        "rung success change spared repeat_rate",
+        "rung success change loss_reduction repeat_rate",
         [each for each in results if each.differences["change"]],
         "change: in success by the faults, paired over tasks",
-        "spared: how much smaller the loss is than that of the rung before",
+        "loss reduction: how much smaller the loss is than that of the rung before",
     )
     repeats = results_table(
         "Repeated exploration, in %",

@@ -115,7 +115,7 @@ class _Ladder:
         if row.teacher is not None:
             names = (f"{number}/teacher", f"{number}/taught")
             run, out = f"samples/{number}-teacher", f"data/{number}-taught"
-            yield from make.teach(names, run, out, row.teacher)
+            yield from make.collect_from_teacher(names, run, out, row.teacher)
         if row.sample is not None:
             sample, run = row.sample, f"samples/{number}"
             yield make.bench(

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, field_validator, model_validator
 
+from agents.configs import StrictSettings
 from agents.expert.corrections import CorrectAfter, CorrectBy
 from agents.finetune.settings import STAGES, Stage
 from benchmarks.study.settings import (
@@ -13,8 +14,7 @@ from benchmarks.study.settings import (
     Evaluation,
     PlaySettings,
     Positive,
-    StrictSettings,
-    Taught,
+    TeacherData,
 )
 
 Control: TypeAlias = Literal["random", "blind"]
@@ -106,7 +106,7 @@ class StageSettings(StrictSettings):
     """
 
     collect: Collected | None = None
-    teacher: Taught | None = None
+    teacher: TeacherData | None = None
     sample: Sampled | None = None
     again: bool = False
     finetune: str

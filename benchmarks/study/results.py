@@ -100,7 +100,7 @@ class Result:
         """As a chart shows it."""
         return Shown(self.name, self.of.faults, self.summary["success"], [*self.by_seed.values()])
 
-    def told(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """All figures, as fractions with their intervals."""
         return {
             "name": self.name,
@@ -192,7 +192,7 @@ _COLUMNS: Mapping[str, tuple[tuple[str, ...], Cells]] = {
     "interval": (("95 %",), lambda each: (interval(each.summary["success"]),)),
     "gain": (("gain", "95 %"), _difference("gain")),
     "change": (("change", "95 %"), _difference("change")),
-    "spared": (("spared", "95 %"), _difference("spared")),
+    "loss_reduction": (("loss reduction", "95 %"), _difference("loss_reduction")),
     "more_repeats": (("more", "95 %"), _difference("more_repeats")),
     "more_revisits": (("more", "95 %"), _difference("more_revisits")),
     "difference": (("difference", "95 %"), _difference("difference")),

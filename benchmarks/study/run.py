@@ -107,7 +107,7 @@ class PhaseFailed(Exception):
         self.phase, self.code = phase, code
 
 
-def begun(plan: Plan, root: Path) -> PlanRecord:
+def saved_record(plan: Plan, root: Path) -> PlanRecord:
     """The record from which a plan goes on in a directory; one without phases if it begins.
 
     Raises:
@@ -204,7 +204,7 @@ def run_plan(
         KeyboardInterrupt: after the running phase has ended.
         OSError: the directory cannot be written to.
     """
-    done = {each.name for each in begun(plan, root).done}
+    done = {each.name for each in saved_record(plan, root).done}
     names = [phase.name for phase in plan.phases]
     if until is not None and until not in names:
         raise PlanError(f"there is no phase {until!r}; there are: {', '.join(names)}")
@@ -212,7 +212,7 @@ def run_plan(
     check_phases(phase for phase in asked if phase.name not in done)
     with exclusive_use(root):
         _wait_for_running(root)
-        record = begun(plan, root)
+        record = saved_record(plan, root)
         done = {each.name for each in record.done}
         _write(root / plan.file, record)
         for number, phase in enumerate(plan.phases, 1):

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from agents.configs import StrictSettings
 from er_gym.data.trajectory import Language
 
 Positive = Annotated[int, Field(gt=0)]
 Pixels = Annotated[int, Field(ge=16, le=4096)]
 """As the options --width and --height take them."""
-
-
-class StrictSettings(BaseModel):
-    """Settings that refuse unknown names."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Collected(StrictSettings):
@@ -33,8 +28,8 @@ class Collected(StrictSettings):
     recipe: str = "paper"
 
 
-class Taught(StrictSettings):
-    """Successful episodes of another agent.
+class TeacherData(StrictSettings):
+    """Successful episodes of a teacher: another agent.
 
     Attributes:
         agent: as ``er-gym bench`` takes it, such as ``searcher``.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from er_gym.data.mentions import Mention, all_alike, named_in
+from er_gym.data.mentions import Mention, all_interchangeable, named_in
 from er_gym.data.phrases import MARK, Phrases
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
@@ -36,7 +36,7 @@ PARTS: Mapping[str, frozenset[str]] = {
 # -- what is seen, and where it is -----------------------------------------------------------------
 
 
-def unseen(thought: Thought) -> Iterator[Refusal]:
+def check_unseen(thought: Thought) -> Iterator[Refusal]:
     """Claims to see an object that is not and was not in view, or says where it is."""
     phrases = thought.phrases
     for clause in thought.clauses:
@@ -58,7 +58,7 @@ def unseen(thought: Thought) -> Iterator[Refusal]:
                         yield _not_seen(mention)
 
 
-def hidden(thought: Thought) -> Iterator[Refusal]:
+def check_hidden(thought: Thought) -> Iterator[Refusal]:
     """States where an object is that was never in view, or what an unopened container holds."""
     phrases = thought.phrases
     for clause in thought.clauses:
@@ -86,7 +86,7 @@ def hidden(thought: Thought) -> Iterator[Refusal]:
                 )
 
 
-def inside(thought: Thought) -> Iterator[Refusal]:
+def check_inside(thought: Thought) -> Iterator[Refusal]:
     """States what is in a closed container that the agent has not opened."""
     for mention, holder in _told_to_be_on(thought):
         if not _is_shut(thought, holder) or not mention.types & thought.seen:
@@ -99,7 +99,7 @@ def inside(thought: Thought) -> Iterator[Refusal]:
             )
 
 
-def support(thought: Thought) -> Iterator[Refusal]:
+def check_support(thought: Thought) -> Iterator[Refusal]:
     """Says that an object in view lies in or on another object than it does."""
     for mention, holder in _told_to_be_on(thought):
         wrong = _not_on(thought, mention, holder)
@@ -122,7 +122,7 @@ def _told_to_be_on(thought: Thought) -> Iterator[tuple[Mention, Mention]]:
                     yield mention, holder
 
 
-def side(thought: Thought) -> Iterator[Refusal]:
+def check_side(thought: Thought) -> Iterator[Refusal]:
     """Says that an object in view is on another side than it is."""
     for clause in thought.clauses:
         if not clause.mentions or clause.guessed or clause.negated or clause.past:
@@ -151,13 +151,14 @@ def _bears_there(thought: Thought, mention: Mention, clause: Clause, direction: 
     Large furniture is on both sides of the view; its centre is not where a thing on it is.
     """
     return any(
-        each.on in all_alike(mention.types) and direction == (each.side if at == "ahead" else at)
+        each.on in all_interchangeable(mention.types)
+        and direction == (each.side if at == "ahead" else at)
         for other in clause.mentions
         for at, each in thought.things(other.types)
     )
 
 
-def denied(thought: Thought) -> Iterator[Refusal]:
+def check_denied(thought: Thought) -> Iterator[Refusal]:
     """Claims not to see an object that is in view."""
     for clause, match in _denials(thought, thought.phrases.denied):
         for mention in clause.named(match, "xs"):
@@ -165,7 +166,7 @@ def denied(thought: Thought) -> Iterator[Refusal]:
                 yield Refusal("unseen", f"{name_of(mention)} is in view; do not say it is not.")
 
 
-def count(thought: Thought) -> Iterator[Refusal]:
+def check_count(thought: Thought) -> Iterator[Refusal]:
     """Claims that more objects of a type are in view than there are."""
     for clause in thought.clauses:
         if not clause.is_fact or clause.past or clause.wanted:
@@ -180,7 +181,7 @@ def count(thought: Thought) -> Iterator[Refusal]:
 # -- states and the hand ---------------------------------------------------------------------------
 
 
-def state(thought: Thought) -> Iterator[Refusal]:
+def check_state(thought: Thought) -> Iterator[Refusal]:
     """Says that something in view is open, closed, on or off, and it is not."""
     phrases = thought.phrases
     for clause in thought.clauses:
@@ -200,7 +201,7 @@ def state(thought: Thought) -> Iterator[Refusal]:
                 yield Refusal("state", f"{name_of(mention)} {wrong}; say so, or leave it out.")
 
 
-def hand(thought: Thought) -> Iterator[Refusal]:
+def check_hand(thought: Thought) -> Iterator[Refusal]:
     """Claims to hold an object that it does not hold, or an empty hand while it holds one."""
     phrases, held = thought.phrases, thought.known.held
     truth = f"the agent holds {held}" if held else "the hand is empty"
@@ -269,7 +270,7 @@ def _is_placing(clause: Clause, match: re.Match[str], phrases: Phrases) -> bool:
 def _is_given(thought: Thought, mention: Mention) -> bool:
     """Whether the instruction says where the thing is ("that is in the Drawer")."""
     return bool(_GIVEN.search(thought.known.instruction)) and bool(
-        mention.types & all_alike(named_in(thought.known.instruction))
+        mention.types & all_interchangeable(named_in(thought.known.instruction))
     )
 
 
@@ -313,7 +314,7 @@ def _holders(thought: Thought, each: SeenObject, view: Sequence[SeenObject]) -> 
             found.add(holder)
             found |= PARTS.get(holder, frozenset())
             upwards += [other.on for other in view if other.type == holder]
-    return {*all_alike(each for each in found if each in OBJECT_TYPES)}
+    return {*all_interchangeable(each for each in found if each in OBJECT_TYPES)}
 
 
 def _not_on(thought: Thought, mention: Mention, holder: Mention) -> str:

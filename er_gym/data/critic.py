@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from er_gym.data import claims, deeds, form
+from er_gym.data import action_claims, claims, form
 from er_gym.data.knowledge import Knowledge
 from er_gym.data.thought import Refusal, Thought
 from er_gym.data.trajectory import ThoughtKind
@@ -22,23 +22,23 @@ _SPACE = re.compile(r"\s+")
 LONGEST_WORD = 30
 """A text with more characters for each word that it may have is not read."""
 CHECKS: tuple[Callable[[Thought], Iterator[Refusal]], ...] = (
-    form.length,
-    form.language,
-    form.tags,
-    form.leak,
-    form.repeat,
-    claims.unseen,
-    claims.hidden,
-    claims.inside,
-    claims.denied,
-    claims.support,
-    claims.side,
-    claims.count,
-    claims.state,
-    claims.hand,
-    deeds.history,
-    deeds.outcome,
-    deeds.decision,
+    form.check_length,
+    form.check_language,
+    form.check_tags,
+    form.check_leak,
+    form.check_repeat,
+    claims.check_unseen,
+    claims.check_hidden,
+    claims.check_inside,
+    claims.check_denied,
+    claims.check_support,
+    claims.check_side,
+    claims.check_count,
+    claims.check_state,
+    claims.check_hand,
+    action_claims.check_history,
+    action_claims.check_outcome,
+    action_claims.check_decision,
 )
 """Every check. Codes: ``length``, ``language``, ``tags``, ``leak``, ``repeat``, ``unseen``,
 ``hidden``, ``support``, ``side``, ``count``, ``state``, ``held``, ``history``, ``decision``."""

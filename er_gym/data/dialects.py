@@ -202,7 +202,7 @@ class Dialect:
         if system := system_text(texts, trajectory.instruction):
             turns.append(ChatTurn("system", (system,)))
         before: Perceived | None = None
-        last: LastDeed | None = None
+        last: ActionResult | None = None
         for index, turn in enumerate(trajectory.turns):
             now = Perceived.at(turn)
             pictures = [(each.direction, each) for each in turn.pictures]
@@ -211,7 +211,7 @@ class Dialect:
             seen = _seen(texts, trajectory, index, now, before, last)
             reply = _reply(texts, trajectory, index, seen)
             turns.append(ChatTurn("assistant", (reply,), turn.train))
-            before, last = now, LastDeed(str(turn.action), turn.success, turn.feedback)
+            before, last = now, ActionResult(str(turn.action), turn.success, turn.feedback)
         return Chat(trajectory.id, tuple(turns), texts.reply_told)
 
 
@@ -253,7 +253,7 @@ def _read_texts(file: Path) -> DialectTexts:
 
 
 @dataclass(frozen=True)
-class LastDeed:
+class ActionResult:
     """The last action and its result.
 
     Attributes:
@@ -289,7 +289,7 @@ def system_text(texts: DialectTexts, instruction: str) -> str:
 def user_turn(
     texts: DialectTexts,
     instruction: str,
-    last: LastDeed | None,
+    last: ActionResult | None,
     pictures: Sequence[tuple[str, Shown]],
     now: Perceived | None = None,
     before: Perceived | None = None,
@@ -305,10 +305,10 @@ def user_turn(
             dialects in which the user tells it. ``now`` is None if nothing was done.
     """
     values = {
-        "task": plain(instruction),
+        "task": without_markup(instruction),
         "actions": texts.list_separator.join(_actions(texts, instruction)),
-        "action": plain(last.action) if last else "",
-        "feedback": plain(last.feedback) if last else "",
+        "action": without_markup(last.action) if last else "",
+        "feedback": without_markup(last.feedback) if last else "",
     }
     if texts.sees == "pictures":
         shown = _shown(pictures)
@@ -324,7 +324,7 @@ def user_turn(
 
 
 def told_scene(
-    texts: DialectTexts, now: Perceived | None, before: Perceived | None, last: LastDeed | None
+    texts: DialectTexts, now: Perceived | None, before: Perceived | None, last: ActionResult | None
 ) -> str:
     """What the agent perceives, in the dialect's words; ``""`` if there is nothing to tell.
 
@@ -356,7 +356,7 @@ def _shown(pictures: Sequence[tuple[str, Shown]]) -> list[tuple[str, Shown]]:
     return sorted(around, key=lambda each: _AROUND_IN_ORDER.index(each[0])) or [*pictures]
 
 
-def _text_for(last: LastDeed | None, directions: Sequence[str]) -> str:
+def _text_for(last: ActionResult | None, directions: Sequence[str]) -> str:
     """The name of the text for a user's turn after the last action, by what is shown."""
     if last is None:
         return "first"
@@ -407,7 +407,7 @@ def _filled(text: str, values: Mapping[str, str]) -> str:
     return _SLOT.sub(lambda slot: values.get(slot[1], slot[0]), text)
 
 
-def plain(text: str) -> str:
+def without_markup(text: str) -> str:
     """A text from outside without what would be read as a picture, a tag or a special token: these
     get square brackets."""
     return _FORBIDDEN.sub(lambda found: f"[{found[0].strip('<>').strip('|')}]", text)
@@ -427,7 +427,7 @@ def _seen(
     index: int,
     now: Perceived,
     before: Perceived | None,
-    last: LastDeed | None,
+    last: ActionResult | None,
 ) -> str:
     """What the assistant says first of what it is shown, in a dialect in which it tells that."""
     shown = bool(trajectory.turns[index].pictures)
@@ -440,7 +440,7 @@ def _reply(texts: DialectTexts, trajectory: Trajectory, index: int, seen: str) -
     """What the assistant says at a turn: what it sees, if it tells that, thoughts and decision."""
     turn = trajectory.turns[index]
     decision = f"<DecisionMaking>{turn.action}</DecisionMaking>"
-    thoughts = [(each.kind, plain(each.text).strip()) for each in turn.thoughts]
+    thoughts = [(each.kind, without_markup(each.text).strip()) for each in turn.thoughts]
     if texts.thoughts == "notes" and texts.notes is not None and not _thinks_itself(trajectory):
         thoughts = [note(texts.notes, trajectory, index)]
     if seen:

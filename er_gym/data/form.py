@@ -29,7 +29,7 @@ _FEW_FOREIGN = 3
 """So many different words of another language are no coincidence."""
 
 
-def words(text: str) -> int:
+def thought_length(text: str) -> int:
     """The length of a thought in words; in Chinese, two characters count as one, rounded up."""
     han = len(_HAN.findall(text))
     return (han + 1) // 2 + len(_HAN.sub(" ", text).split()) - _lonely(text)
@@ -40,9 +40,9 @@ def _lonely(text: str) -> int:
     return sum(1 for each in _HAN.sub(" ", text).split() if not re.search(r"\w", each))
 
 
-def length(thought: Thought) -> Iterator[Refusal]:
+def check_length(thought: Thought) -> Iterator[Refusal]:
     """Empty, shorter than three words, or over the limit."""
-    count = words(thought.text)
+    count = thought_length(thought.text)
     if not thought.text.strip():
         yield Refusal("length", "The thought is empty; write a sentence.")
     elif count < _FEWEST:
@@ -51,7 +51,7 @@ def length(thought: Thought) -> Iterator[Refusal]:
         yield Refusal("length", f"The thought has {count} words; write at most {thought.limit}.")
 
 
-def language(thought: Thought) -> Iterator[Refusal]:
+def check_language(thought: Thought) -> Iterator[Refusal]:
     """It is not in the language that was asked for, or mixes two languages."""
     text = thought.text
     other = _OTHER_SCRIPTS.search(text)
@@ -69,7 +69,7 @@ def language(thought: Thought) -> Iterator[Refusal]:
         yield Refusal("language", "Write in English only.")
 
 
-def tags(thought: Thought) -> Iterator[Refusal]:
+def check_tags(thought: Thought) -> Iterator[Refusal]:
     """Marks that are no part of a thought: tags, names of speakers or of kinds, headings."""
     found = (
         _MARKUP.search(thought.text)
@@ -84,7 +84,7 @@ def tags(thought: Thought) -> Iterator[Refusal]:
         )
 
 
-def leak(thought: Thought) -> Iterator[Refusal]:
+def check_leak(thought: Thought) -> Iterator[Refusal]:
     """Mentions the prompt, the data or itself as a model, or contains an error's text."""
     found = thought.phrases.leak.search(thought.text.lower().replace("’", "'"))
     if found:
@@ -95,7 +95,7 @@ def leak(thought: Thought) -> Iterator[Refusal]:
         )
 
 
-def repeat(thought: Thought) -> Iterator[Refusal]:
+def check_repeat(thought: Thought) -> Iterator[Refusal]:
     """The text of an earlier thought of the episode."""
     plain = _PLAIN.sub("", thought.text).casefold()
     for turn in thought.known.earlier:

@@ -16,8 +16,8 @@ from er_gym.data.cells import CoveredPicture
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.dialects import (
     SEEN,
+    ActionResult,
     Dialect,
-    LastDeed,
     in_tag,
     told_scene,
     user_turn,
@@ -31,9 +31,9 @@ QUESTIONS = 4
 """Questions about single things in a conversation, at most."""
 _UNSEEN = 0.3
 """The share of them that are about things that are not in view."""
-_CAME = LastDeed(verbs.NAVIGATE, True, "")
+_CAME = ActionResult(verbs.NAVIGATE, True, "")
 """After it, the user shows the view ahead and no more."""
-_LOOKED_AROUND = LastDeed(verbs.OBSERVE, True, "")
+_LOOKED_AROUND = ActionResult(verbs.OBSERVE, True, "")
 
 
 @dataclass(frozen=True)

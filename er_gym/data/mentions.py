@@ -148,7 +148,7 @@ def _plurals(name: str) -> Iterator[str]:
 
 
 @cache
-def alike(object_type: str) -> frozenset[str]:
+def interchangeable(object_type: str) -> frozenset[str]:
     """The types that count as one: a Sink and its SinkBasin, an Egg and its EggCracked."""
     others = {other for other in OBJECT_TYPES if same_type(object_type, other)}
     whole = object_type.removesuffix("Sliced").removesuffix("Cracked")
@@ -156,9 +156,9 @@ def alike(object_type: str) -> frozenset[str]:
     return frozenset(others)
 
 
-def all_alike(types: Iterable[str]) -> frozenset[str]:
-    """:func:`alike` of several types."""
-    return frozenset(other for each in types for other in alike(each))
+def all_interchangeable(types: Iterable[str]) -> frozenset[str]:
+    """:func:`interchangeable` of several types."""
+    return frozenset(other for each in types for other in interchangeable(each))
 
 
 @cache

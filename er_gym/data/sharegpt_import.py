@@ -17,11 +17,11 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import er_gym
-from er_gym.data.album import Album, Outside, picture_name
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import Collection, CollectionManifest
 from er_gym.data.exports.paper_reader import PURPOSE
-from er_gym.data.heard import UserMessage, language_of, thoughts_of, user_message
+from er_gym.data.parse_conversation import UserMessage, language_of, thoughts_of, user_message
+from er_gym.data.picture_folder import PictureFolder, PicturesElsewhere, picture_name
 from er_gym.data.sharegpt_files import ShareGptFile
 from er_gym.data.sharegpt_report import decision
 from er_gym.data.trajectory import Language, PictureRecord, Trajectory, Turn
@@ -69,7 +69,7 @@ class ImportSummary:
     pictures: int
     without_scene: int
     left_out: int
-    outside: Outside
+    outside: PicturesElsewhere
 
 
 def import_sharegpt(
@@ -97,9 +97,9 @@ def import_sharegpt(
     """
     counts: Counter[str] = Counter()
     with whole_folder(out) as draft:
-        album = Album(draft, copy=copy)
+        picture_folder = PictureFolder(draft, copy=copy)
         collection = Collection.create(draft, _manifest(file))
-        collection.write(_trajectories(file, album, counts, progress))
+        collection.write(_trajectories(file, picture_folder, counts, progress))
         left_out = _write_left_out(file, draft)
     return ImportSummary(
         samples=len(file),
@@ -110,7 +110,7 @@ def import_sharegpt(
         pictures=counts["pictures"],
         without_scene=counts["without scene"],
         left_out=left_out,
-        outside=album.outside,
+        outside=picture_folder.outside,
     )
 
 
@@ -205,12 +205,12 @@ def _task_type(where: str) -> str:
 
 
 def _trajectories(
-    file: ShareGptFile, album: Album, counts: Counter[str], progress: Progress
+    file: ShareGptFile, picture_folder: PictureFolder, counts: Counter[str], progress: Progress
 ) -> Iterator[Trajectory]:
     names = _Names(file)
     for chat in _whole(file, progress):
         trajectory = trajectory_of(chat).model_copy(update={"id": names.of(chat.id)})
-        trajectory = _with_pictures(trajectory, file.folder, album)
+        trajectory = _with_pictures(trajectory, file.folder, picture_folder)
         counts["trajectories"] += 1
         counts[trajectory.part] += 1
         counts["turns"] += len(trajectory.turns)
@@ -274,7 +274,9 @@ class _Names:
         return self._theirs
 
 
-def _with_pictures(trajectory: Trajectory, folder: Path, album: Album) -> Trajectory:
+def _with_pictures(
+    trajectory: Trajectory, folder: Path, picture_folder: PictureFolder
+) -> Trajectory:
     number = 0
     turns: list[Turn] = []
     under = PurePosixPath("pictures", file_stem(trajectory.id))
@@ -282,7 +284,7 @@ def _with_pictures(trajectory: Trajectory, folder: Path, album: Album) -> Trajec
         pictures: list[PictureRecord] = []
         for picture in turn.pictures:
             path = under / picture_name(f"{number:03}", picture)
-            album.place(folder / picture.path, path, within=folder)
+            picture_folder.place(folder / picture.path, path, within=folder)
             pictures.append(picture.model_copy(update={"path": str(path)}))
             number += 1
         turns.append(turn.model_copy(update={"pictures": pictures}))

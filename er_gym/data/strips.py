@@ -128,11 +128,11 @@ def _words(index: int, turn: Turn, fonts: Mapping[str, Font]) -> Iterator[_Line]
 
 
 def _folded(text: str, font: Font, colour: str, width: int, *, indent: int = 0) -> Iterator[_Line]:
-    for line in fold(text, font, width - indent):
+    for line in wrap_text(text, font, width - indent):
         yield _Line(line, font, colour, indent=indent)
 
 
-def fold(text: str, font: Font, width: int) -> list[str]:
+def wrap_text(text: str, font: Font, width: int) -> list[str]:
     """Lines of a text that fit a width, broken between words, or within where a word is longer or
     has no spaces, as in Chinese.
 

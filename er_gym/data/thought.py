@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from er_gym.data.knowledge import Knowledge
-from er_gym.data.mentions import Mention, all_alike, named_in
+from er_gym.data.mentions import Mention, all_interchangeable, named_in
 from er_gym.data.phrases import Phrases
 from er_gym.data.reading import PHRASES, Clause, read
 from er_gym.data.trajectory import SeenObject
@@ -60,7 +60,7 @@ class Thought:
     @cached_property
     def in_view(self) -> frozenset[str]:
         """The types in view, those alike included."""
-        return all_alike(self.known.in_view)
+        return all_interchangeable(self.known.in_view)
 
     @cached_property
     def seen(self) -> frozenset[str]:
@@ -68,12 +68,12 @@ class Thought:
         known = self.known
         taken = (each.action.object_type for each in known.actions if each.success)
         types = (*known.seen, *known.in_view, known.held, *taken)
-        return all_alike(each for each in types if each in OBJECT_TYPES) | {"Floor"}
+        return all_interchangeable(each for each in types if each in OBJECT_TYPES) | {"Floor"}
 
     @cached_property
     def held(self) -> frozenset[str]:
         """The type in the hand, those alike included; empty for none."""
-        return all_alike([self.known.held]) if self.known.held else frozenset()
+        return all_interchangeable([self.known.held]) if self.known.held else frozenset()
 
     @cached_property
     def mentionable(self) -> frozenset[str]:
@@ -85,11 +85,11 @@ class Thought:
             *(*known.navigable, *known.interactable, *known.plan, *places, *own),
             *named_in(known.instruction),
         )
-        return self.seen | all_alike(each for each in types if each in OBJECT_TYPES)
+        return self.seen | all_interchangeable(each for each in types if each in OBJECT_TYPES)
 
     def things(self, types: Iterable[str]) -> Iterator[tuple[str, SeenObject]]:
         """The objects of some types that are in view, each with its direction."""
-        wanted = all_alike(types)
+        wanted = all_interchangeable(types)
         for direction, view in self.views.items():
             for each in view:
                 if each.type in wanted:
@@ -97,7 +97,7 @@ class Thought:
 
     def done(self, verb: str, types: frozenset[str]) -> bool:
         """Whether the agent did that to one of some types."""
-        wanted = all_alike(types)
+        wanted = all_interchangeable(types)
         return any(
             each.success and each.action.verb == verb and each.action.object_type in wanted
             for each in self.known.actions

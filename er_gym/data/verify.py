@@ -17,9 +17,9 @@ from er_gym.data.line_index import Line, lines_of, trajectory_at
 from er_gym.data.replay import replay
 from er_gym.data.trajectory import Trajectory
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.rollout.machines import THIS_MACHINE, Machines
-from er_gym.rollout.play import one_line
+from er_gym.rollout.play import error_with_location
 from er_gym.rollout.processes import Terminated
+from er_gym.rollout.worker_backend import LOCAL_BACKEND, WorkerBackend
 from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.task import Task
@@ -89,7 +89,7 @@ def verify(
     pictures: bool = True,
     limit: int | None = None,
     workers: int = 1,
-    machines: Machines = THIS_MACHINE,
+    worker_backend: WorkerBackend = LOCAL_BACKEND,
 ) -> Generator[Verdict, None, None]:
     """Verify the trajectories of a collection; the verdicts come in no particular order.
 
@@ -99,7 +99,7 @@ def verify(
         pictures: whether pictures are compared; without them it is several times as fast.
         limit: verify only the first so many.
         workers: how many processes, at least 1.
-        machines: where they run; they must see the collection's files.
+        worker_backend: where they run; they must see the collection's files.
 
     Raises:
         CollectionError: the collection is damaged.
@@ -109,7 +109,9 @@ def verify(
     collection.parts()  # a damaged part is told before anything is played
     batches = _batches(lines, tasks)
     make = partial(_Worker, collection.path.absolute(), pictures)
-    with closing(machines.run_jobs(make, batches, workers=workers, room=_room)) as results:
+    with closing(
+        worker_backend.run_jobs(make, batches, workers=workers, affinity_key=_room)
+    ) as results:
         for batch, verdicts in results:
             if isinstance(verdicts, LostJob):
                 yield from (Verdict(line.id, (str(verdicts),)) for line in batch.lines)
@@ -219,7 +221,7 @@ class _Worker:
             raise
         except Exception as error:  # damaged records may raise anything
             self.close()
-            return [one_line(error)]
+            return [error_with_location(error)]
 
     def _of(self, part: str) -> EmbodiedEnv:
         """The environment of a part; that of the part before is closed."""

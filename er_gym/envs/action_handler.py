@@ -48,7 +48,7 @@ class EpisodeSetup:
 
 
 @dataclass(frozen=True)
-class Moment:
+class StepContext:
     """What an action handler knows when the agent acts.
 
     Attributes:
@@ -78,7 +78,7 @@ class ActionHandler(Protocol):
     def legal(self, available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
 
-    def execute(self, action: Action, now: Moment) -> ExecutedAction:
+    def execute(self, action: Action, now: StepContext) -> ExecutedAction:
         """Carry out a legal action."""
 
 
@@ -106,7 +106,7 @@ class DefaultActionHandler:
         """See :func:`~er_gym.envs.legality.legal_actions`."""
         return legality.legal_actions(available, known)
 
-    def execute(self, action: Action, now: Moment) -> ExecutedAction:
+    def execute(self, action: Action, now: StepContext) -> ExecutedAction:
         """Carry out a legal action by the skills of :mod:`er_gym.envs.skills`."""
         setup, objects = self._setup, now.perception.objects
         if action.verb == verbs.OBSERVE:
@@ -129,7 +129,7 @@ class DefaultActionHandler:
         done = skills.interact(setup.controller, action.verb, objects, chosen)
         return objects.ids[chosen], done
 
-    def _navigate(self, object_type: str, now: Moment) -> ExecutedAction:
+    def _navigate(self, object_type: str, now: StepContext) -> ExecutedAction:
         setup, perception = self._setup, now.perception
         objects = perception.objects
         able = objects.of_type(object_type)

@@ -77,7 +77,7 @@ def parse(text: str) -> Action | None:
     return None
 
 
-def understand(action: AnyAction) -> tuple[Action | None, str]:
+def parse_action(action: AnyAction) -> tuple[Action | None, str]:
     """The action that a value means (None if a text names no action), and its text.
 
     Raises:

@@ -441,7 +441,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         return answer
 
     def _do(self, episode: Episode, action: AnyAction) -> StepResult:
-        understood, text = episode.understand(action)
+        understood, text = episode.parse_action(action)
         self._no_episode = _BROKEN_OFF  # until this has succeeded
         self._actions_taken.append(int(action.item()) if isinstance(action, np.ndarray) else action)
         answer = episode.step(understood, text)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs import skills
-from er_gym.envs.action_handler import ActionHandler, EpisodeSetup, Moment
+from er_gym.envs.action_handler import ActionHandler, EpisodeSetup, StepContext
 from er_gym.envs.actions import Action, AnyAction
 from er_gym.envs.faults import FaultPlan, FaultyActionHandler
 from er_gym.envs.info import REPEATED, Details, Info, LegalActions
@@ -142,13 +142,13 @@ class Episode:
             return self._step_limit
         return min(self._step_limit, self._steps + self._replies_left)
 
-    def understand(self, action: AnyAction) -> tuple[Action | None, str]:
+    def parse_action(self, action: AnyAction) -> tuple[Action | None, str]:
         """The action that a reply means (None if it names no action), and its text.
 
         Raises:
             gymnasium.error.InvalidAction: the reply is not an action; nothing has changed.
         """
-        return self._protocol.understand(action, self.perception.objects)
+        return self._protocol.parse_action(action, self.perception.objects)
 
     def action_mask(self) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for each action that is legal now."""
@@ -159,7 +159,7 @@ class Episode:
         return self._controller.last_event.metadata["objects"]  # type: ignore[no-any-return]
 
     def step(self, understood: Action | None, text: str) -> StepResult:
-        """Do an action that :meth:`understand` returned."""
+        """Do an action that :meth:`parse_action` returned."""
         self._fault = ""
         if self._replies_left is not None:
             self._replies_left -= 1
@@ -180,7 +180,7 @@ class Episode:
             object_id, outcome = "", skills.Outcome(None, False, refused)
         else:
             object_id, outcome = self._handler.execute(
-                understood, Moment(self.perception, self._available, self._progress.left)
+                understood, StepContext(self.perception, self._available, self._progress.left)
             )
             self._fault = "" if self._faulty is None else self._faulty.fault
         self._memory.act(understood, outcome.success)

@@ -23,7 +23,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.action_handler import ActionHandler, ExecutedAction, Moment
+from er_gym.envs.action_handler import ActionHandler, ExecutedAction, StepContext
 from er_gym.envs.actions import Action
 from er_gym.envs.arguments import number, short_repr
 from er_gym.envs.legality import AvailableObjects, KnownTypes
@@ -191,7 +191,7 @@ class FaultyActionHandler:
         """The protocol's."""
         return self._inner.legal(available, known)
 
-    def execute(self, action: Action, now: Moment) -> ExecutedAction:
+    def execute(self, action: Action, now: StepContext) -> ExecutedAction:
         """Carry out a legal action, or let it go wrong.
 
         Where a navigation arrives elsewhere, the id is that of the object arrived at.
@@ -208,7 +208,7 @@ class FaultyActionHandler:
             return self._arrive_elsewhere(action, now)
         return "", Outcome(None, False, _ARM_FAILED[kind])
 
-    def _arrive_elsewhere(self, action: Action, now: Moment) -> ExecutedAction:
+    def _arrive_elsewhere(self, action: Action, now: StepContext) -> ExecutedAction:
         objects = now.perception.objects
         places = other_places(action.object_type, self._known.names, objects, self.navigated_to)
         if not places:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.action_handler import EpisodeSetup, ExecutedAction, Moment
+from er_gym.envs.action_handler import EpisodeSetup, ExecutedAction, StepContext
 from er_gym.envs.actions import INDEX, INDICES, NO_ACTION, Action, AnyAction, text_of
 from er_gym.envs.legality import AvailableObjects, KnownTypes, navigable_within
 from er_gym.envs.paper_approach import ObjectSnapshot, approach, current_snapshot, snapshot_of
@@ -38,7 +38,7 @@ _SECOND_WHEN_HOLDING = frozenset({"84", "85"})
 type means the second target while the hand holds something."""
 
 
-def understand_as_paper(action: AnyAction, objects: ObjectTable) -> tuple[Action | None, str]:
+def parse_action_as_paper(action: AnyAction, objects: ObjectTable) -> tuple[Action | None, str]:
     """The action that the paper's runner reads in a text (None if it reads none), and the text.
 
     Case and leading spaces of the text matter for the verb. The object is the last word of the
@@ -131,7 +131,7 @@ class PaperActionHandler:
             legal[indices[indices >= 0]] = 1
         return legal
 
-    def execute(self, action: Action, now: Moment) -> ExecutedAction:
+    def execute(self, action: Action, now: StepContext) -> ExecutedAction:
         """Carry out a legal action."""
         setup, controller = self._setup, self._setup.controller
         if action.verb == verbs.OBSERVE:

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from er_gym.envs.action_handler import ActionHandler, DefaultActionHandler, EpisodeSetup
-from er_gym.envs.actions import Action, AnyAction, understand
+from er_gym.envs.actions import Action, AnyAction, parse_action
 from er_gym.envs.arguments import one_of
-from er_gym.envs.paper_action_handler import PaperActionHandler, understand_as_paper
+from er_gym.envs.paper_action_handler import PaperActionHandler, parse_action_as_paper
 from er_gym.envs.paper_approach import start_in_corner
 from er_gym.envs.skills import Reachable, start_pose
 from er_gym.tasks.task import AgentPose
@@ -28,7 +28,7 @@ class EpisodeProtocol:
 
     Attributes:
         name: as ``--protocol`` and ``EmbodiedEnv(protocol=…)`` take it.
-        understand: returns the action that a reply means (None if it means none), and its text.
+        parse_action: returns the action that a reply means (None if it means none), and its text.
         action_handler: makes the handler that judges and carries out an episode's actions.
         start: returns the start pose, given ``sceneBounds`` and the reachable positions.
         chooses_instances: whether the protocol decides which object a type name stands for.
@@ -40,7 +40,7 @@ class EpisodeProtocol:
     """
 
     name: str
-    understand: Callable[[AnyAction, ObjectTable], tuple[Action | None, str]]
+    parse_action: Callable[[AnyAction, ObjectTable], tuple[Action | None, str]]
     action_handler: Callable[[EpisodeSetup], ActionHandler]
     start: Callable[[Mapping[str, Any], Reachable], AgentPose]
     chooses_instances: bool = False
@@ -52,13 +52,13 @@ class EpisodeProtocol:
 
 DEFAULT = EpisodeProtocol(
     name="default",
-    understand=lambda action, _: understand(action),
+    parse_action=lambda action, _: parse_action(action),
     action_handler=DefaultActionHandler,
     start=start_pose,
 )
 PAPER = EpisodeProtocol(
     name="paper",
-    understand=understand_as_paper,
+    parse_action=parse_action_as_paper,
     action_handler=PaperActionHandler,
     start=start_in_corner,
     chooses_instances=True,

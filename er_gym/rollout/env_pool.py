@@ -14,7 +14,7 @@ from typing import Any
 
 from er_gym.envs.actions import Action
 from er_gym.rollout.env_worker import EnvLost, EnvWorker, request_to, result_of
-from er_gym.rollout.machines import THIS_MACHINE, Machines
+from er_gym.rollout.worker_backend import LOCAL_BACKEND, WorkerBackend
 from er_gym.rollout.worker_pool import WorkerSetupError
 
 __all__ = ["DEADLINE_SECONDS", "EnvLost", "EnvPool", "RemoteEnv"]
@@ -34,7 +34,7 @@ class EnvPool:
         slots: the number of environments.
         env: the keyword arguments of :class:`~er_gym.envs.embodied_env.EmbodiedEnv`.
         deadline: seconds; a process that leaves a request unanswered for longer is killed.
-        machines: where the processes run.
+        worker_backend: where the processes run.
 
     Attributes:
         closed: whether the ``with`` statement has ended, so that the processes end or have ended.
@@ -47,12 +47,12 @@ class EnvPool:
         env: Mapping[str, Any],
         *,
         deadline: float = DEADLINE_SECONDS,
-        machines: Machines = THIS_MACHINE,
+        worker_backend: WorkerBackend = LOCAL_BACKEND,
     ) -> None:
         self.deadline = deadline
         self.closed = False
         self._workers, self._slots = min(workers, slots), slots
-        self._kwargs, self._machines = dict(env), machines
+        self._kwargs, self._worker_backend = dict(env), worker_backend
         self._lock = threading.Lock()  # guards starting and ending processes
         self._team: list[EnvWorker] = []
 
@@ -92,7 +92,7 @@ class EnvPool:
 
     def _start(self, place: int) -> EnvWorker:
         slots = range(place, self._slots, self._workers)
-        return self._machines.start_env_worker(slots, self._kwargs)
+        return self._worker_backend.start_env_worker(slots, self._kwargs)
 
     def _close(self) -> None:
         with self._lock:

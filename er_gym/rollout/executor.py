@@ -14,10 +14,10 @@ from er_gym.rollout.agent import (
     MakeAgent,
     check_attachments,
 )
-from er_gym.rollout.machines import THIS_MACHINE, Machines
-from er_gym.rollout.play import episode_seed, one_line
+from er_gym.rollout.play import episode_seed, error_with_location
 from er_gym.rollout.records import EpisodeRecord, record_episode
 from er_gym.rollout.run_directory import Manifest, RunDirectory
+from er_gym.rollout.worker_backend import LOCAL_BACKEND, WorkerBackend
 from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.task import Task
 from er_gym.writing import file_stem
@@ -58,7 +58,7 @@ class PlayedEpisode:
         except CannotGoOn:
             raise
         except Exception as error:  # agents are other people's code and must not end the run
-            problem = record.error or one_line(error)
+            problem = record.error or error_with_location(error)
             crashed = {"success": False, "end_reason": "", "error": problem}
             return cls(record.model_copy(update=crashed))
         return cls(record, files, folders)
@@ -85,7 +85,7 @@ class Parallelism:
         deadline: seconds within which an environment in another process must answer. The time
             includes the wait for the other environments of that process. When it is over, the
             process is killed.
-        machines: where the worker processes run.
+        worker_backend: where the worker processes run.
 
     Raises:
         ValueError: a number is out of its range.
@@ -94,7 +94,7 @@ class Parallelism:
     workers: int = 1
     concurrency: int = 8
     deadline: float = 600.0
-    machines: Machines = THIS_MACHINE
+    worker_backend: WorkerBackend = LOCAL_BACKEND
 
     def __post_init__(self) -> None:
         for name, value in (("workers", self.workers), ("concurrency", self.concurrency)):

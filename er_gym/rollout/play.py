@@ -95,7 +95,7 @@ def play_episode(
     except CannotFinish as caught:
         gave_up = caught
     except (Exception, SystemExit) as caught:  # other people's code must not end the run
-        error = one_line(caught)
+        error = error_with_location(caught)
     return record_episode(
         task,
         agent=agent_name or type(agent).__name__,
@@ -112,7 +112,7 @@ def play_episode(
     )
 
 
-def one_line(error: BaseException) -> str:
+def error_with_location(error: BaseException) -> str:
     """The type of an exception, its message, and the file and line that raised it, in one line."""
     text = _encodable(" ".join(traceback.format_exception_only(error)[-1].split()))
     frames = traceback.extract_tb(error.__traceback__)

@@ -22,7 +22,7 @@ from er_gym.rollout.executor import (
     EpisodeSettings,
     PlayedEpisode,
 )
-from er_gym.rollout.play import one_line, play_episode
+from er_gym.rollout.play import error_with_location, play_episode
 from er_gym.rollout.processes import Terminated
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.worker_pool import LostJob
@@ -33,18 +33,18 @@ def play_in_processes(assigned: Assignment) -> None:
     """Play each task in one of ``parallelism.workers`` processes. See :class:`.Executor`."""
     make_agent, directory = assigned.make_agent, assigned.directory
     settings, parallelism = assigned.episodes, assigned.parallelism
-    machines = parallelism.machines
+    worker_backend = parallelism.worker_backend
     _check_picklable(make_agent)
     worker = partial(
         EpisodeWorker,
         make_agent,
         settings,
         directory.path.absolute(),
-        appends_events=machines.is_here,
-        writes_files=machines.shares_files and not machines.is_here,
+        appends_events=worker_backend.is_local,
+        writes_files=worker_backend.shares_files and not worker_backend.is_local,
     )
-    results = machines.run_jobs(
-        worker, assigned.tasks, workers=parallelism.workers, room=attrgetter("scene")
+    results = worker_backend.run_jobs(
+        worker, assigned.tasks, workers=parallelism.workers, affinity_key=attrgetter("scene")
     )
     with closing(results), closing(EventLog(directory.path)) as events:
         for task, result in results:
@@ -144,7 +144,7 @@ class EpisodeWorker:
         except Terminated:
             raise
         except (Exception, SystemExit) as error:  # it must not end the run, as in play_episode
-            return PlayedEpisode(self._settings.unbegun(task, one_line(error)))
+            return PlayedEpisode(self._settings.unbegun(task, error_with_location(error)))
         try:
             record = play_episode(
                 self._env,

@@ -93,7 +93,7 @@ def _finished(directory: RunDirectory, wanted: Container[str]) -> Iterator[Episo
     return (each for each in directory.episodes() if each.key in wanted and not each.error)
 
 
-def tell_late(directory: RunDirectory) -> None:
+def append_missing_events(directory: RunDirectory) -> None:
     """Append the events that are missing in the stream for results in the records.
 
     A process that was killed after writing a record and before its event leaves such a result.
@@ -172,7 +172,7 @@ def run(
     if executor not in EXECUTORS:
         raise ValueError(f"unknown executor {executor!r}; choose one of: {', '.join(EXECUTORS)}")
     wanted = episodes_of(tasks, samples)
-    tell_late(directory)
+    append_missing_events(directory)
     done = {episode.key for episode in _finished(directory, wanted)}
     # An episode goes through the executors as a task of its own, whose id is the episode's key.
     todo = [

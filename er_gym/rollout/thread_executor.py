@@ -21,7 +21,7 @@ from er_gym.rollout.executor import (
     EpisodeSettings,
     PlayedEpisode,
 )
-from er_gym.rollout.play import one_line, play_episode
+from er_gym.rollout.play import error_with_location, play_episode
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.task import Task
@@ -48,7 +48,7 @@ def play_in_threads(assigned: Assignment) -> None:
             slots,
             env,
             deadline=parallelism.deadline,
-            machines=parallelism.machines,
+            worker_backend=parallelism.worker_backend,
         ) as pool,
         closing(EventLog(directory.path)) as events,
     ):
@@ -161,7 +161,7 @@ class _ThreadedRun:
         except CannotGoOn:
             raise
         except (Exception, SystemExit) as error:  # it must not end the run, as in play_episode
-            return None, self.settings.unbegun(task, one_line(error))
+            return None, self.settings.unbegun(task, error_with_location(error))
         record = play_episode(
             env,
             player,

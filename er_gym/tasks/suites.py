@@ -16,7 +16,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from er_gym.plugins import PluginError, Registry, reason
+from er_gym.plugins import PluginError, Registry, error_line
 from er_gym.tasks import jsonl_format, paper_format
 from er_gym.tasks.errors import SetAsideTask, TaskFileError, summarise_set_aside
 from er_gym.tasks.files import validated
@@ -109,7 +109,7 @@ def load_suite(name: str) -> Suite:
         suite = found if isinstance(found, Suite) else found()
     except Exception as error:  # another package's code can raise anything
         raise PluginError(
-            f"suite {name!r} cannot be made ({reason(error)}); it is called without arguments"
+            f"suite {name!r} cannot be made ({error_line(error)}); it is called without arguments"
         ) from error
     if not isinstance(suite, Suite):
         raise PluginError(f"suite {name!r} makes {type(suite).__name__}; give an {__name__}.Suite")

@@ -16,7 +16,7 @@ from difflib import get_close_matches
 from functools import lru_cache
 from typing import Protocol
 
-from er_gym.plugins import PluginError, added
+from er_gym.plugins import PluginError, added_objects
 
 SEARCH, MANIPULATE, TRANSPORT, COMPOSITE = "Search", "Manipulate", "Transport", "Composite"
 GROUPS = (SEARCH, MANIPULATE, TRANSPORT, COMPOSITE)
@@ -121,7 +121,7 @@ def load_added() -> None:
         PluginError: a row cannot be loaded or used.
     """
     expected = f"an {__name__}.TaskType"
-    for found, origin in added("task type", "task_types", expected, registers=True):
+    for found, origin in added_objects("task type", "task_types", expected, registers=True):
         if not isinstance(found, TaskType):
             raise PluginError(f"{origin} is {found!r}; give {expected}")
         register(found)

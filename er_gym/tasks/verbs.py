@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from er_gym.plugins import VARIABLE, PluginError, added
+from er_gym.plugins import VARIABLE, PluginError, added_objects
 from er_gym.thor.object_types import OBJECT_TYPES
 from er_gym.thor.objects import PROPERTY_OF_STATE
 
@@ -291,7 +291,7 @@ def table() -> tuple[Verb, ...]:
     expected = f"an {__name__}.Verb"
     given = [
         *((verb, "register()") for verb in _registered),
-        *added("verb", "verbs", expected),
+        *added_objects("verb", "verbs", expected),
     ]
     for verb, origin in given:
         if not isinstance(verb, Verb):

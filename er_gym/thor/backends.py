@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from er_gym.thor.places import Release
+from er_gym.thor.client_folder import Release
 
 if TYPE_CHECKING:
     from ai2thor.controller import Controller  # half a second to import

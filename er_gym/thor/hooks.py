@@ -12,7 +12,7 @@ from pathlib import Path
 
 from er_gym.plugins import NOT_FROM_HERE
 from er_gym.thor import client_hook
-from er_gym.thor.places import PlayerError, client_home
+from er_gym.thor.client_folder import PlayerError, client_home
 from er_gym.writing import write_atomic
 
 _HOOK = "er_gym_player_hook"

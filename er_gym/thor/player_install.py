@@ -11,11 +11,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from er_gym.thor import client_hook
+from er_gym.thor.client_folder import (
+    ClientFile,
+    GpuMapping,
+    PlayerError,
+    Release,
+    client_home,
+    sweep,
+)
 from er_gym.thor.hooks import hook_folders, remove_hooks, write_hook
-from er_gym.thor.places import GpuMapping, Place, PlayerError, Release, client_home, sweep
 
 RELEASES = tuple(Release(platform) for platform in client_hook.PLATFORMS)
-_PLACES: tuple[Place, ...] = (*RELEASES, GpuMapping())
+_CLIENT_FILES: tuple[ClientFile, ...] = (*RELEASES, GpuMapping())
 
 
 @dataclass(frozen=True)
@@ -55,8 +62,8 @@ def install(*, force: bool = False, python: str = sys.executable) -> Installed:
             _check_build(release, force)
         if GpuMapping().is_foreign and os.path.lexists(GpuMapping().set_aside):
             raise _both_occupied(GpuMapping())
-        for place in _PLACES:
-            place.put()
+        for file in _CLIENT_FILES:
+            file.put()
         return Installed(RELEASES, write_hook(folders), tuple(_soon_pruned()))
 
 
@@ -80,9 +87,9 @@ def _check_build(release: Release, force: bool) -> None:
             raise _both_occupied(release)
 
 
-def _both_occupied(place: Place) -> PlayerError:
+def _both_occupied(file: ClientFile) -> PlayerError:
     return PlayerError(
-        f"{place.path} is not er-gym's, and neither is {place.set_aside}, which is set aside "
+        f"{file.path} is not er-gym's, and neither is {file.set_aside}, which is set aside "
         "already; move one of the two away"
     )
 
@@ -102,7 +109,7 @@ def uninstall() -> tuple[Release, ...]:
     if not client_home().is_dir():
         raise nothing
     with _installation_lock():
-        removed = [sweep(), *(place.clear() for place in _PLACES), remove_hooks()]
+        removed = [sweep(), *(file.clear() for file in _CLIENT_FILES), remove_hooks()]
     if not any(removed):
         raise nothing
     with contextlib.suppress(OSError):  # they are not empty: the client keeps its logs there
@@ -113,7 +120,7 @@ def uninstall() -> tuple[Release, ...]:
 
 def still_aside() -> list[Path]:
     """Files that :func:`install` set aside and whose place is taken, so that they stay there."""
-    return [place.set_aside for place in _PLACES if os.path.lexists(place.set_aside)]
+    return [file.set_aside for file in _CLIENT_FILES if os.path.lexists(file.set_aside)]
 
 
 @contextlib.contextmanager

@@ -87,7 +87,7 @@ def draft_name(path: Path, ending: str) -> str:
     return f"{os.fsdecode(os.fsencode(path.name)[:_LONGEST_NAME])}.{secrets.token_hex(8)}.{ending}"
 
 
-def reason(error: OSError, path: Path) -> str:
+def write_problem(error: OSError, path: Path) -> str:
     """The reason for an error, in words; it names the file's folder, not the draft."""
     if isinstance(error, (FileNotFoundError, NotADirectoryError)):
         return f"there is no folder {path.parent}; make it first"
@@ -133,4 +133,4 @@ def _draft(
         # An error that names another file is one of the block's own.
         if isinstance(error, CannotWrite) or error.filename not in (None, draft):
             raise
-        raise CannotWrite(f"{path}: cannot be written: {reason(error, path)}") from error
+        raise CannotWrite(f"{path}: cannot be written: {write_problem(error, path)}") from error

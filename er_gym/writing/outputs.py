@@ -8,7 +8,7 @@ import stat
 import zlib
 from pathlib import Path
 
-from er_gym.writing.atomic import CannotWrite, reason, write_atomic
+from er_gym.writing.atomic import CannotWrite, write_atomic, write_problem
 
 MARKDOWN_MARK = "<!-- Written by er-gym -->\n"
 """The first line of er-gym's Markdown files; readers do not see it."""
@@ -67,7 +67,7 @@ def check_output(path: str | Path, data: bytes | None = None, *, force: bool = F
             why = f"there is no folder {folder}; make it first"
             raise CannotWrite(f"{path}: cannot be written: {why}") from None
     except OSError as error:
-        raise CannotWrite(f"{path}: cannot be written: {reason(error, path)}") from error
+        raise CannotWrite(f"{path}: cannot be written: {write_problem(error, path)}") from error
     else:
         if not stat.S_ISREG(kind):
             what = "a folder" if stat.S_ISDIR(kind) else "a device or a pipe"

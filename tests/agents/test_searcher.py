@@ -9,7 +9,7 @@ import pytest
 
 from agents import make_agent
 from agents.scripted.searcher import instruction as words
-from agents.scripted.searcher.instruction import Goal, understand
+from agents.scripted.searcher.instruction import Goal, parse_instruction
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -86,7 +86,9 @@ def deeds_asked(task: Task) -> Deeds:
 
 
 def misread(tasks: Iterable[Task]) -> list[str]:
-    return [t.instruction for t in tasks if deeds_of(understand(t.instruction)) != deeds_asked(t)]
+    return [
+        t.instruction for t in tasks if deeds_of(parse_instruction(t.instruction)) != deeds_asked(t)
+    ]
 
 
 @pytest.mark.parametrize("suite", ["mini", "er-1k"])
@@ -130,7 +132,7 @@ def test_instructions_of_the_paper_are_understood(shared_data) -> None:
     ],
 )
 def test_other_wordings_are_understood_too(instruction: str, goals: list[Goal]) -> None:
-    assert list(understand(instruction)) == goals
+    assert list(parse_instruction(instruction)) == goals
 
 
 @pytest.fixture(scope="module")

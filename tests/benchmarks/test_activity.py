@@ -9,7 +9,7 @@ import pytest
 from support import ROOT
 
 from benchmarks.cli import activity, live_line
-from benchmarks.cli.activity import doing, saying_what_it_does
+from benchmarks.cli.activity import doing, showing_activity
 from benchmarks.cli.live_line import Line
 from benchmarks.cli.progress import bar
 from benchmarks.harness.processes import run
@@ -114,7 +114,7 @@ def test_what_lower_layers_tell_is_shown_while_a_command_runs(on_screen):
     screen = on_screen()
     assert LOG.name == activity._HEARD
     begin("unheard")
-    with saying_what_it_does():
+    with showing_activity():
         begin("starting 2 workers")
         draw()
         begin_import("a package", "no_such_package")
@@ -130,7 +130,7 @@ def test_without_a_terminal_only_imports_are_told(term, capsys, monkeypatch):
     monkeypatch.setenv("TERM", term)
     if term == "dumb":
         monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    with saying_what_it_does():
+    with showing_activity():
         doing("reading")
         begin("starting")
         begin_import("PyTorch", "no_such_package")
@@ -139,7 +139,7 @@ def test_without_a_terminal_only_imports_are_told(term, capsys, monkeypatch):
 
 def test_what_is_told_is_not_logged_again_by_a_package_that_configures_logging(caplog):
     """As minari does when it is imported; pytest's own handler is one of the root logger."""
-    with saying_what_it_does():
+    with showing_activity():
         begin("starting")
     assert caplog.records == []
     assert LOG.propagate

@@ -68,7 +68,7 @@ def collected(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("collected") / "x"
     told = collect(out, *PLAIN, "--limit", SOME, "--workers", 1)
     assert f"{SOME} trajectories in " in told
-    # An audition foretells how an episode comes out: none is played that is not taken.
+    # A prescreening foretells how an episode comes out: none is played that is not taken.
     assert f"; {SOME} episodes played now" in told
     return out
 

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from benchmarks.cli.errors import INTERRUPTED, STOPPED, BadInput, entered, exit_code_of, needing
 from benchmarks.cli.executor import ExecutorOptions
-from benchmarks.cli.options import OptionGroup, option, seed_option, shared, with_options
+from benchmarks.cli.options import OptionGroup, option, seed_option, shared_option, with_options
 from benchmarks.cli.vlm_options import VLMOptions
 from er_gym.rollout.agent import CannotGoOn
 
@@ -26,7 +26,7 @@ class Wishes(OptionGroup):
     most_dollars: float | None = option(type=float, help="So much.")
     names: tuple[str, ...] = option("--name", multiple=True)
     quick: bool = option(is_flag=True)
-    seed: int = shared(seed_option)
+    seed: int = shared_option(seed_option)
 
 
 @click.command()

@@ -12,7 +12,7 @@ from benchmarks.cli import doctor_checks
 from benchmarks.cli import main as cli
 from benchmarks.cli.extras import extras, state_of
 from er_gym.thor import player_install as players
-from er_gym.thor.places import GpuMapping, Release
+from er_gym.thor.client_folder import GpuMapping, Release
 
 
 @pytest.fixture(autouse=True)

@@ -20,8 +20,8 @@ from unsteady_agent import CRASHES
 
 from benchmarks.cli import main as cli
 from benchmarks.monitor.comparison import difference, pairs_of
-from benchmarks.monitor.export import Wanted, export
-from benchmarks.monitor.places import Places
+from benchmarks.monitor.directories import Directories
+from benchmarks.monitor.export import ExportRequest, export
 from benchmarks.monitor.run_view import RunView
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.paired import paired_difference
@@ -48,10 +48,10 @@ def told(run: Path) -> tuple[int, float, float | None, float | None]:
 
 def shown(run: Path) -> tuple[int, float | None, float | None, float | None]:
     """The same, as the monitor has them."""
-    view = RunView(Places([run]).of_kind("run")[0])
+    view = RunView(Directories([run]).of_kind("run")[0])
     view.read()
-    tally = view.summary().success
-    return tally.n, tally.rate, tally.low, tally.high
+    count = view.summary().success
+    return count.n, count.rate, count.low, count.high
 
 
 def logged(run: Path) -> dict[int, float]:
@@ -104,7 +104,7 @@ def test_every_surface_tells_the_same_rate(played: tuple[Path, str], er_gym: Com
     assert "33.33" in out
     assert "2 of 6 episodes crashed and count as failures" in out
     page = run.parent / "run.html"
-    export(Wanted(run=run, out=page, episodes=None, draw=False))
+    export(ExportRequest(run=run, out=page, episodes=None, draw=False))
     assert "33.3" in page.read_text(encoding="utf-8")
 
 
@@ -160,7 +160,7 @@ def test_a_comparison_counts_as_the_reports_do(run: Path, er_gym: Command) -> No
     assert code == 0, err
     rows = []
     for each in (run, other):
-        view = RunView(Places([each]).of_kind("run")[0])
+        view = RunView(Directories([each]).of_kind("run")[0])
         view.read()
         rows.append(view.rows)
     found = difference("", pairs_of(*rows))

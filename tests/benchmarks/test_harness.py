@@ -24,7 +24,7 @@ from benchmarks.harness.chat_server import (
 from benchmarks.harness.measuring import in_turns, per_second, timed
 from benchmarks.harness.output import json_option, print_table, write_figures
 from benchmarks.harness.processes import plain_environment, run
-from benchmarks.harness.tally import Tally, end, holds, tally
+from benchmarks.harness.tally import Tally, end, has_words, tally
 from er_gym.tasks.suites import load_suite
 
 # -- tries -----------------------------------------------------------------------------------------
@@ -34,22 +34,22 @@ def test_each_problem_is_told_and_each_try_counted_once(capsys):
     tries = [("one", []), ("two", iter(["late", "loud"])), ("three", ["lost"])]
     done = tally("things", tries)
     assert capsys.readouterr().out == "two: late\ntwo: loud\nthree: lost\n"
-    assert (done.tried, done.short) == (3, 2)
+    assert (done.tried, done.failed) == (3, 2)
     assert str(done).startswith("3 things in ")
     both = Tally("all", 1, 1, 2.0) + done
-    assert (both.what, both.tried, both.short) == ("all", 4, 3)
+    assert (both.what, both.tried, both.failed) == ("all", 4, 3)
 
 
-@pytest.mark.parametrize(("short", "code"), [(0, 0), (2, 1)])
-def test_a_failure_is_the_exit_code(short, code):
+@pytest.mark.parametrize(("failed", "code"), [(0, 0), (2, 1)])
+def test_a_failure_is_the_exit_code(failed, code):
     with pytest.raises(SystemExit) as ended:
-        end(Tally("things", 3, short))
+        end(Tally("things", 3, failed))
     assert ended.value.code == code
 
 
 def test_tries_are_chosen_by_all_words():
-    assert holds("a server that hangs", ["server", "hangs"])
-    assert not holds("a server that hangs", ["server", "lies"])
+    assert has_words("a server that hangs", ["server", "hangs"])
+    assert not has_words("a server that hangs", ["server", "lies"])
 
 
 # -- measuring and printing ------------------------------------------------------------------------

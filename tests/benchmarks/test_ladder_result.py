@@ -82,11 +82,11 @@ def test_what_faults_cost_is_paired_over_tasks(
         losses[name] = mean(after[task] - before[task] for task in before)
         assert faulty.differences["change"] is not None
         assert faulty.differences["change"].mean == pytest.approx(losses[name])
-    assert results["exploration", RATE].differences["spared"] is None
-    spared = results["reflection", RATE].differences["spared"]
-    assert spared is not None
-    assert spared.mean == pytest.approx(losses["reflection"] - losses["exploration"])
-    assert spared.low < spared.mean < spared.high
+    assert results["exploration", RATE].differences["loss_reduction"] is None
+    reduction = results["reflection", RATE].differences["loss_reduction"]
+    assert reduction is not None
+    assert reduction.mean == pytest.approx(losses["reflection"] - losses["exploration"])
+    assert reduction.low < reduction.mean < reduction.high
     (table,) = (each for each in ladder_tables([*results.values()]) if "faults" in each.title)
     assert [row[0] for row in table.rows] == ["exploration", "reflection"]
 

@@ -94,7 +94,7 @@ def test_failed_steps_score_nothing(episode):
 
 def test_a_key_action_counts_once(episode):
     played = ("pickup Egg", "put in Bowl", "pickup Egg", "put in Bowl")
-    counted = PAPER.tally(episode(TRANSPORT, played))
+    counted = PAPER.count(episode(TRANSPORT, played))
     assert counted.points == 2
     assert counted.scored == ("pickup Egg", "put Bowl")
 

@@ -11,7 +11,7 @@ from played_turns import knowledge
 from support import in_one_test
 
 from er_gym.data.critic import CHECKS, check
-from er_gym.data.form import words
+from er_gym.data.form import thought_length
 from er_gym.data.knowledge import Knowledge
 from er_gym.data.trajectory import SeenObject, Subgoal, ThoughtRecord
 from er_gym.envs.actions import Action
@@ -253,8 +253,8 @@ def test_what_the_instruction_tells_may_be_said() -> None:
 
 
 def test_length_is_counted_in_words() -> None:
-    assert words("I look around, then I go on.") == 7
-    assert words("我先看看周围。") == 3
+    assert thought_length("I look around, then I go on.") == 7
+    assert thought_length("我先看看周围。") == 3
     assert [each.code for each in check("One two three four.", "planning", scene(), limit=3)] == [
         "length"
     ]

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from er_gym.data.heard import thoughts_of
 from er_gym.data.json_items import json_items
+from er_gym.data.parse_conversation import thoughts_of
 from er_gym.data.sharegpt_files import ShareGptError, open_sharegpt
 from er_gym.data.sharegpt_import import import_sharegpt
 from er_gym.tasks.errors import TaskFileError

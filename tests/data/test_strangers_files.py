@@ -179,7 +179,7 @@ def with_name(one: Trajectory, field: str, name: str) -> Trajectory:
 def test_two_conversations_of_one_id_are_printed_for_other_programs(
     home: Path, tmp_path: Path
 ) -> None:
-    from agents.finetune.printing.sources import SourceJob, open_source
+    from agents.finetune.launchers.sources import SourceJob, open_source
     from agents.finetune.settings import DataSettings
 
     file = written(home / "t.json", [talk("x", "a.png"), talk("x", "b.png"), talk("x-2", "c.png")])

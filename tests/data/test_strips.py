@@ -13,7 +13,7 @@ from er_gym.data import fonts, strips
 from er_gym.data.collection import Collection
 from er_gym.data.fonts import NoFont, font_for
 from er_gym.data.pictures import difference, encode_picture
-from er_gym.data.strips import COLOURS, draw_strip, fold
+from er_gym.data.strips import COLOURS, draw_strip, wrap_text
 
 
 @pytest.fixture(scope="module")
@@ -64,11 +64,11 @@ def test_lines_fit_and_lose_nothing() -> None:
         "我先看看四周前面有一个冰箱" * 10,
         "one\ntwo",
     ):
-        lines = fold(text, font, 200)
+        lines = wrap_text(text, font, 200)
         assert all(font.getlength(line) <= 200 for line in lines)
         assert "".join("".join(lines).split()) == "".join(text.split())
-    assert fold("", font, 200) == [""]
-    assert fold("aa bb", font, 10_000) == ["aa bb"]
+    assert wrap_text("", font, 200) == [""]
+    assert wrap_text("aa bb", font, 10_000) == ["aa bb"]
 
 
 def test_letters_that_no_font_has_are_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from er_gym.data.course_checks import course_problems
 from er_gym.data.critic import Refusal
 from er_gym.data.line_index import lines_of
 from er_gym.data.trajectory import Trajectory
-from er_gym.rollout import machines
+from er_gym.rollout import worker_backend
 from er_gym.tasks.suites import load_suite
 
 
@@ -42,7 +42,7 @@ def verdicts(monkeypatch: pytest.MonkeyPatch) -> Callable[..., dict[str, verify.
         yield from ((job, worker(job)) for job in jobs)
         worker.close()
 
-    monkeypatch.setattr(machines, "run_jobs", run_here)
+    monkeypatch.setattr(worker_backend, "run_jobs", run_here)
 
     def run(collection: Collection, **options: Any) -> dict[str, verify.Verdict]:
         return {one.id: one for one in verify.verify(collection, SUITE.tasks, **options)}

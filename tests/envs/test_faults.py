@@ -12,7 +12,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from er_gym.envs.action_handler import Moment
+from er_gym.envs.action_handler import StepContext
 from er_gym.envs.actions import ACTIONS, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.faults import KIND_OF_VERB, KINDS, FaultPlan, other_places, parse_faults
@@ -128,7 +128,7 @@ def test_there_may_be_nowhere_else(envs: Callable[..., EmbodiedEnv]) -> None:
     handler, perception = episode._handler, episode.perception
     handler._known = KnownTypes(["Fridge"])  # type: ignore[attr-defined]
     object_id, outcome = handler.execute(
-        Action(verbs.NAVIGATE, "Fridge"), Moment(perception, episode._available, ())
+        Action(verbs.NAVIGATE, "Fridge"), StepContext(perception, episode._available, ())
     )
     assert (object_id, outcome.perception, outcome.success) == ("", None, False)
     assert outcome.problem == "you did not get there, and are still where you were"

@@ -19,7 +19,7 @@ from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS, INDEX, NO_ACTION, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.info import with_details
-from er_gym.envs.paper_action_handler import NO_OBJECT, understand_as_paper
+from er_gym.envs.paper_action_handler import NO_OBJECT, parse_action_as_paper
 from er_gym.envs.paper_skills import _back_off, observe
 from er_gym.envs.protocol import PROTOCOLS
 from er_gym.rollout.agent import Decision
@@ -184,7 +184,7 @@ def test_texts_are_read_as_the_papers_runner_reads_them(
     env: EmbodiedEnv, text: str, meant: str | None
 ) -> None:
     env.reset(options={"task": TAKE_APPLE})
-    action, said = understand_as_paper(text, env._episode.perception.objects)
+    action, said = parse_action_as_paper(text, env._episode.perception.objects)
     assert said == text
     assert (None if action is None else str(action)) == meant
 

@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 
 from agents.vlm.record import PictureRecord
+from benchmarks.monitor.directories import Directories
 from benchmarks.monitor.episode_view import picture_file
-from benchmarks.monitor.places import Places
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.writing import file_stem
 
@@ -44,20 +44,22 @@ def folder(runs: Path, tmp_path: Path) -> Path:
 
 def test_no_address_leads_out_of_the_folders(folder, serve, visit):
     server, client = serve(folder), visit(folder)
-    (place,) = Places([folder]).all()
-    key = next(iter(RunDirectory.open(place.path).episodes())).key
-    assert server.raw(f"/runs/{place.id}")[0] == 200
+    (directory,) = Directories([folder]).all()
+    key = next(iter(RunDirectory.open(directory.path).episodes())).key
+    assert server.raw(f"/runs/{directory.id}")[0] == 200
     for path in PATHS:
-        status, text = server.raw(path.format(id=place.id))
+        status, text = server.raw(path.format(id=directory.id))
         assert status in (307, 400, 404), path
         assert SECRET not in text, path
     for name in ("episode", "picture", "map", "frame"):
         for asked in KEYS:
-            answer = client.get(f"/runs/{place.id}/{name}", params={"key": asked.format(key=key)})
+            answer = client.get(
+                f"/runs/{directory.id}/{name}", params={"key": asked.format(key=key)}
+            )
             assert answer.status_code == 404, (name, asked)
             assert SECRET not in answer.text
     for n in ("-1", "99999999999999999999", "1.5", "٣", "x"):
-        answer = client.get(f"/runs/{place.id}/frame", params={"key": key, "n": n})
+        answer = client.get(f"/runs/{directory.id}/frame", params={"key": key, "n": n})
         assert answer.status_code in (404, 422), n
 
 
@@ -81,14 +83,14 @@ def test_links_are_not_followed(folder, visit):
     outside = folder.parent / "outside"
     shutil.copytree(folder / "oracle", outside)
     (folder / "linked").symlink_to(outside, target_is_directory=True)
-    assert [place.path.name for place in Places([folder]).all()] == ["oracle"]
+    assert [directory.path.name for directory in Directories([folder]).all()] == ["oracle"]
     key = next(iter(RunDirectory.open(outside).episodes())).key
     run = folder / "oracle"
     conversation = run / "conversations" / f"{file_stem(key)}.json"
     conversation.parent.mkdir(exist_ok=True)
     conversation.symlink_to(folder.parent / "secret.json")
-    (place,) = Places([folder]).all()
-    answer = visit(folder).get(f"/runs/{place.id}/episode", params={"key": key})
+    (directory,) = Directories([folder]).all()
+    answer = visit(folder).get(f"/runs/{directory.id}/episode", params={"key": key})
     assert answer.status_code == 200
     assert SECRET not in answer.text
 

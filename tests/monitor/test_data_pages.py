@@ -13,9 +13,9 @@ from fastapi.testclient import TestClient
 from played_collection import make_collection
 
 from benchmarks.monitor.collection_index import CollectionIndex
+from benchmarks.monitor.directories import Directories
+from benchmarks.monitor.fingerprint import fingerprint
 from benchmarks.monitor.flow import flow
-from benchmarks.monitor.growth import growth
-from benchmarks.monitor.places import Places
 from er_gym.data.collection import TRAJECTORIES, Collection
 from er_gym.data.statistics import statistics
 from er_gym.data.trajectory import Trajectory
@@ -54,8 +54,8 @@ def client(folder: Path, visit) -> TestClient:
 
 @pytest.fixture
 def address(folder: Path) -> str:
-    (place,) = Places([folder]).of_kind("collection")
-    return f"/data/{place.id}"
+    (directory,) = Directories([folder]).of_kind("collection")
+    return f"/data/{directory.id}"
 
 
 def said(text: str) -> str:
@@ -196,11 +196,14 @@ def test_pictures_come_from_the_collection_alone(collection, tmp_path, visit):
     turn = turn.model_copy(update={"pictures": shown})
     other.write([first.model_copy(update={"turns": [turn], "part": "../.."})])
     client = visit(tmp_path)
-    (place,) = Places([tmp_path]).of_kind("collection")
+    (directory,) = Directories([tmp_path]).of_kind("collection")
     for number in range(len(paths)):
-        answer = client.get(f"/data/{place.id}/picture", params={"key": first.id, "n": number})
+        answer = client.get(f"/data/{directory.id}/picture", params={"key": first.id, "n": number})
         assert answer.status_code == 404, paths[number]
-    assert "part is not there" in client.get(f"/data/{place.id}/map", params={"key": first.id}).text
+    assert (
+        "part is not there"
+        in client.get(f"/data/{directory.id}/map", params={"key": first.id}).text
+    )
 
 
 def test_what_a_model_says_stays_text(collection, tmp_path, visit):
@@ -210,9 +213,9 @@ def test_what_a_model_says_stays_text(collection, tmp_path, visit):
     update = {"instruction": HOSTILE, "task_type": HOSTILE, "part": HOSTILE, "actor": HOSTILE}
     other.write([hostile.model_copy(update=update)])
     client = visit(tmp_path)
-    (place,) = Places([tmp_path]).of_kind("collection")
+    (directory,) = Directories([tmp_path]).of_kind("collection")
     for path in ("", f"/trajectory?key={first.id}"):
-        text = client.get(f"/data/{place.id}{path}").text
+        text = client.get(f"/data/{directory.id}{path}").text
         assert "<img src=x" not in text
         assert "<script>alert" not in text
         assert "\u202e" not in said(text)
@@ -224,16 +227,16 @@ def test_a_collection_that_is_being_made_can_be_followed(collection, tmp_path, v
     (growing / "parts").mkdir(parents=True)
     (growing / "collection.json").write_text(collection.manifest.model_dump_json())
     client = visit(tmp_path)
-    (place,) = Places([tmp_path]).of_kind("collection")
-    before = growth(place)
-    assert "when it ends or is interrupted" in client.get(f"/data/{place.id}").text
+    (directory,) = Directories([tmp_path]).of_kind("collection")
+    before = fingerprint(directory)
+    assert "when it ends or is interrupted" in client.get(f"/data/{directory.id}").text
     part = growing / "parts" / "imitation"
     part.mkdir()
     (part / "events.jsonl").write_text(
         '{"time":1.0,"kind":"run_begun","suite":"s","agent":"a","tasks":9,"done":0}\n'
     )
-    assert growth(place) != before
-    assert "imitation stopped 0 of 9" in said(client.get(f"/data/{place.id}").text)
+    assert fingerprint(directory) != before
+    assert "imitation stopped 0 of 9" in said(client.get(f"/data/{directory.id}").text)
 
 
 def test_a_flow_keeps_its_widths():

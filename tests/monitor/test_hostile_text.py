@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from agents.vlm.record import ConversationRecord
-from benchmarks.monitor.places import Places
+from benchmarks.monitor.directories import Directories
 from er_gym.rollout.events import EpisodeBegun, EventLog, RunBegun
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.writing import file_stem
@@ -90,13 +90,13 @@ def test_it_is_shown_and_changes_nothing(text, tmp_path, manifest, episode, visi
     key = run_of(tmp_path, manifest, episode, text)
     plain = run_of(tmp_path / "plain", manifest, episode, "harmless")
     client = visit(tmp_path)
-    every = {place.name: place for place in Places([tmp_path]).all()}
+    every = {directory.name: directory for directory in Directories([tmp_path]).all()}
     (hostile,) = (each for each in every.values() if "plain" not in each.name)
     (harmless,) = (each for each in every.values() if "plain" in each.name)
     for page in ("/runs/{id}", "/runs/{id}/episode?key={key}", "/runs/{id}?text={text}"):
         answers = [
-            client.get(page.format(id=place.id, key=name, text="%3Cscript%3E%22"))
-            for place, name in ((hostile, key), (harmless, plain))
+            client.get(page.format(id=directory.id, key=name, text="%3Cscript%3E%22"))
+            for directory, name in ((hostile, key), (harmless, plain))
         ]
         assert [each.status_code for each in answers] == [200, 200]
         found, wanted = (seen(each.text) for each in answers)
@@ -126,8 +126,8 @@ def test_a_stream_may_hold_anything(tmp_path, manifest, visit):
             b'{"time":1,"kind":"episode_begun"}\n{"kind":"step","time":{}}\n' + b"[" * 99_999
         )
     client = visit(tmp_path)
-    (place,) = Places([tmp_path]).all()
-    answer = client.get(f"/runs/{place.id}")
+    (directory,) = Directories([tmp_path]).all()
+    answer = client.get(f"/runs/{directory.id}")
     assert answer.status_code == 200
     text = "".join(seen(answer.text).text)
     assert f"0 of {len(HOSTILE)}" in text

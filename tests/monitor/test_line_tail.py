@@ -25,7 +25,7 @@ class Reader:
         """Read what is new; whether all before was void."""
         began = False
         for some in self.tail.read():
-            if some.anew:
+            if some.restarted:
                 began, self.lines, self.too_long = True, [], 0
             self.too_long += some.passed_over
             offset = some.offset

@@ -18,9 +18,9 @@ from agents.vlm.chat import Usage
 from agents.vlm.clients.budget import Budget, Entry, Ledger
 from agents.vlm.settings import Prices
 from benchmarks.monitor.app import make_app
+from benchmarks.monitor.directories import Directories
 from benchmarks.monitor.failures import FAILURES, Failure, failure_of
 from benchmarks.monitor.language import words_in
-from benchmarks.monitor.places import Places
 from benchmarks.monitor.run_view import Filter
 from benchmarks.monitor.site import Site
 from er_gym.rollout.run_directory import SPENDING, RunDirectory
@@ -36,7 +36,7 @@ def client(runs: Path, visit) -> TestClient:
 @pytest.fixture
 def ids(runs: Path) -> dict[str, str]:
     """The addresses' ids of both runs, by name."""
-    return {place.path.name: place.id for place in Places([runs]).all()}
+    return {directory.path.name: directory.id for directory in Directories([runs]).all()}
 
 
 def rows(text: str) -> list[str]:
@@ -72,11 +72,11 @@ def test_runs_are_read_before_a_page_is_asked_for(runs, tmp_path):
         assert "8 of 8" in said(client.get("/").text)
     closing.set()
     (tmp_path / "events.jsonl").rename(folder / "events.jsonl")
-    late = Site(Places([folder]))
+    late = Site(Directories([folder]))
     late.read_runs(closing)
     (folder / "events.jsonl").unlink()
     shutil.rmtree(folder / "episodes")
-    assert late.summary(late.places.all()[0]).finished == 0
+    assert late.summary(late.directories.all()[0]).finished == 0
 
 
 def test_a_run_costs_what_its_ledger_says_with_the_answers_that_were_rejected(
@@ -86,7 +86,7 @@ def test_a_run_costs_what_its_ledger_says_with_the_answers_that_were_rejected(
     ledger = Ledger(Budget(), Prices())
     ledger.open(folder / SPENDING)
     client = visit(folder)
-    address = f"/runs/{Places([folder]).all()[0].id}"
+    address = f"/runs/{Directories([folder]).all()[0].id}"
 
     def pay(usage: Usage, rejected: str) -> None:
         ledger.enter(Entry.of(usage, model="m", seed=1, cost=0.75, seconds=0.1, rejected=rejected))

@@ -14,8 +14,8 @@ from typing import Any
 from fastapi.testclient import TestClient
 from filelock import lock_descriptor
 
-from benchmarks.monitor.growth import growth, in_use
-from benchmarks.monitor.places import Places
+from benchmarks.monitor.directories import Directories
+from benchmarks.monitor.fingerprint import fingerprint, in_use
 from benchmarks.study.kinds import ABLATION, LADDER, Study
 from benchmarks.study.run import DonePhase, Plan, PlanRecord
 from er_gym import __version__
@@ -76,7 +76,7 @@ def make_plan(plan: Plan, folder: Path, done: int) -> None:
 
 
 def page(client: TestClient, root: Path, name: str) -> str:
-    (id,) = (each.id for each in Places([root]).all() if each.path == root / name)
+    (id,) = (each.id for each in Directories([root]).all() if each.path == root / name)
     answer = client.get(f"/training/{id}")
     assert answer.status_code == 200
     return answer.text
@@ -88,11 +88,11 @@ def test_a_fine_tuning_grows_while_it_is_looked_at(tmp_path, visit):
     first = page(client, tmp_path, "tuning")
     assert "100 / 400" in said(first)  # one of four epochs
     assert len(re.findall(r'<svg class="chart"', first)) == 4
-    (place,) = Places([tmp_path]).all()
-    before = growth(place)
+    (directory,) = Directories([tmp_path]).all()
+    before = fingerprint(directory)
     with (folder / "metrics.jsonl").open("a") as log:
         log.write(metric(200, 0.25))
-    assert growth(place) != before
+    assert fingerprint(directory) != before
     second = page(client, tmp_path, "tuning")
     assert "200 / 400" in said(second)
     assert "0.25" in said(second)
@@ -130,7 +130,7 @@ def test_a_ladder_shows_its_phases_and_the_success_of_each_rung(tmp_path, visit,
     assert states == ["finished"] * measured + ["running"] + ["waiting"] * (
         len(names) - measured - 1
     )
-    ids = {each.path: each.id for each in Places([tmp_path]).all()}
+    ids = {each.path: each.id for each in Directories([tmp_path]).all()}
     for name, kind in (("evaluations/0-base", "runs"), ("1-imitation", "training")):
         assert f'href="/{kind}/{ids[root / name]}"' in text
     results = text[text.index('id="results"') : text.index('id="phases"')]

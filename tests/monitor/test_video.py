@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from benchmarks.cli import main as cli
-from benchmarks.monitor.places import Places
+from benchmarks.monitor.directories import Directories
 from benchmarks.monitor.video import film
 from benchmarks.monitor.world import Worlds
 from er_gym.rollout.run_directory import RunDirectory
@@ -73,16 +73,16 @@ def _ink(picture: Image.Image) -> int:
 
 def test_the_page_offers_it(runs, visit):
     client = visit(runs)
-    (place,) = (each for each in Places([runs]).all() if each.path.name == "oracle")
-    key = next(RunDirectory.open(place.path).episodes()).key
-    page = client.get(f"/runs/{place.id}/episode", params={"key": key})
-    assert f'href="/runs/{place.id}/video?key={key}"' in page.text
-    answer = client.get(f"/runs/{place.id}/video", params={"key": key})
+    (directory,) = (each for each in Directories([runs]).all() if each.path.name == "oracle")
+    key = next(RunDirectory.open(directory.path).episodes()).key
+    page = client.get(f"/runs/{directory.id}/episode", params={"key": key})
+    assert f'href="/runs/{directory.id}/video?key={key}"' in page.text
+    answer = client.get(f"/runs/{directory.id}/video", params={"key": key})
     assert answer.headers["content-type"] == "image/webp"
     assert "attachment" in answer.headers["content-disposition"]
     with Image.open(io.BytesIO(answer.content)) as picture:
         assert picture.n_frames > 1
-    assert client.get(f"/runs/{place.id}/video", params={"key": "../x"}).status_code == 404
+    assert client.get(f"/runs/{directory.id}/video", params={"key": "../x"}).status_code == 404
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ import pytest
 from er_gym.envs.actions import Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.env_pool import EnvLost, EnvPool
-from er_gym.rollout.play import one_line
+from er_gym.rollout.play import error_with_location
 from er_gym.rollout.worker_pool import WorkerSetupError
 from er_gym.tasks.paper_format import read_tasks
 
@@ -158,7 +158,7 @@ def test_what_it_raises_is_raised_here(engines, task):
     here.close()
     assert type(remote) is type(local)
     assert "FloorPlan999" in str(remote)
-    assert one_line(remote) == one_line(local)  # with file and line
+    assert error_with_location(remote) == error_with_location(local)  # with file and line
     assert env.lost is None
 
 

@@ -15,7 +15,7 @@ from agents import Decision, NamedAgent, make_agent
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.envs.embodied_env import EmbodiedEnv
-from er_gym.rollout import machines, runner
+from er_gym.rollout import runner, worker_backend
 from er_gym.rollout.events import EpisodeEnded
 from er_gym.rollout.executor import Parallelism
 from er_gym.rollout.play import episode_seed, play_episode
@@ -298,7 +298,7 @@ def test_a_task_that_kills_its_worker_is_reported(new_run_directory, tasks, monk
         for job in jobs:
             yield job, LostJob(tries=3, exitcode=-9)
 
-    monkeypatch.setattr(machines, "run_jobs", give_up)
+    monkeypatch.setattr(worker_backend, "run_jobs", give_up)
     outcome = run(run_directory, tasks[:1])
     (record,) = outcome.crashed
     assert record.error == "the worker process died 3 times, last with exit code -9"

@@ -16,7 +16,7 @@ from ai2thor.platform import Linux64, Request
 
 from er_gym.thor import BackendError, client_hook, make_controller
 from er_gym.thor import player_install as players
-from er_gym.thor.places import GpuMapping, Release
+from er_gym.thor.client_folder import GpuMapping, Release
 
 RELEASES = players.RELEASES
 

@@ -68,9 +68,9 @@ def _fitting(
         writing.nouns.forget()
         text = polished(writing.write(kind, facts), language)
         parts = sentences(text, language)
-        if words(text, language) <= limit and len({*parts} - {*said}) == len(parts):
+        if length_in_words(text, language) <= limit and len({*parts} - {*said}) == len(parts):
             return text
-        if not shortest or words(text, language) < words(shortest, language):
+        if not shortest or length_in_words(text, language) < length_in_words(shortest, language):
             shortest = text
     return _cut(sentences(shortest, language), limit, language)
 
@@ -78,7 +78,7 @@ def _fitting(
 def _cut(parts: Sequence[str], limit: int, language: Language) -> str:
     """The last sentences, which hold the decision, that fit into the limit; at least one."""
     space = "" if language == "zh" else " "
-    while len(parts) > 1 and words(space.join(parts), language) > limit:
+    while len(parts) > 1 and length_in_words(space.join(parts), language) > limit:
         parts = parts[1:]
     return space.join(parts)
 
@@ -97,7 +97,7 @@ def sentences(text: str, language: Language) -> list[str]:
     return [part.strip() for part in _SENTENCE[language].split(text) if part.strip()]
 
 
-def words(text: str, language: Language) -> int:
+def length_in_words(text: str, language: Language) -> int:
     """The length in words; in Chinese two characters count as a word."""
     han = len(_HAN.findall(text)) if language == "zh" else 0
     rest = _HAN.sub(" ", text) if han else text

@@ -10,7 +10,7 @@ from agents.expert.writers.prompts import WriterPrompts
 from agents.expert.writers.registry import checked_grounded
 from agents.expert.writers.replies import (
     NO_REPLY,
-    OwnWords,
+    EchoCheck,
     codes_of,
     quoted,
     read_thought,
@@ -67,7 +67,7 @@ class ModelWriter:
         shown = request.pictures if self._settings.sees == "pictures" else ()
         pictures = [within_bounds(each, self._settings.pictures) for each in shown]
         conversation = [self._prompts.role(), self._prompts.turn(request, pictures)]
-        drafts = _Drafts(request, self._prompts.own_words)
+        drafts = _Drafts(request, self._prompts.echo_check)
         replies: list[ModelReply] = []
         for attempt in range(TRIES):
             try:
@@ -122,13 +122,13 @@ class _Drafts:
 
     Attributes:
         request: the turn.
-        own_words: checks that the model does not repeat its prompt.
+        echo_check: checks that the model does not repeat its prompt.
         texts: the thoughts that stand, by index.
         refused: the codes of the refusals of each thought, by index.
     """
 
     request: ThoughtRequest
-    own_words: OwnWords
+    echo_check: EchoCheck
     texts: dict[int, str] = field(default_factory=dict)
     refused: dict[int, list[str]] = field(init=False)
 
@@ -169,7 +169,7 @@ class _Drafts:
         ]
         known = replace(known, earlier=[*known.earlier, now])
         refusals = (
-            *self.own_words.refusals(found.text),
+            *self.echo_check.refusals(found.text),
             *check(found.text, kind, known, limit=limit),
         )
         if not refusals:

@@ -12,7 +12,7 @@ from typing import Any
 from agents.expert.writers.base import ThoughtRequest
 from agents.expert.writers.facts import facts_of
 from agents.expert.writers.nouns import names
-from agents.expert.writers.replies import OwnWords
+from agents.expert.writers.replies import EchoCheck
 from agents.vlm.chat import Message, Picture
 from agents.vlm.prompt_set import interleave_pictures, without_marks
 from agents.vlm.template_files import TemplateFiles
@@ -86,9 +86,9 @@ class WriterPrompts:
         return self.files.digest
 
     @cached_property
-    def own_words(self) -> OwnWords:
+    def echo_check(self) -> EchoCheck:
         """Checks that what is written does not repeat these prompts."""
-        return OwnWords.than(self.files.sources.values())
+        return EchoCheck.against(self.files.sources.values())
 
     def role(self) -> Message:
         """The system message for thoughts."""

@@ -9,7 +9,7 @@ from functools import lru_cache
 from agents.expert.writers.base import ThoughtWriter
 from agents.expert.writers.checked import CheckedWriter
 from agents.expert.writers.grounded import GroundedWriter
-from er_gym.plugins import PluginError, Registry, reason
+from er_gym.plugins import PluginError, Registry, error_line
 
 
 def checked_grounded() -> ThoughtWriter:
@@ -51,8 +51,8 @@ def _writer(name: str) -> ThoughtWriter:
         writer = make()
     except Exception as error:  # another package's code can raise anything
         raise PluginError(
-            f"writer of thoughts {name!r} cannot be made ({reason(error)}); it is called without "
-            "arguments"
+            f"writer of thoughts {name!r} cannot be made ({error_line(error)}); it is called "
+            "without arguments"
         ) from error
     if not (isinstance(getattr(writer, "name", None), str) and hasattr(writer, "write")):
         raise PluginError(

@@ -62,7 +62,7 @@ def read_thought(reply: Reply, kind: ThoughtKind, limit: int) -> ReadThought:
 
 
 @dataclass(frozen=True)
-class OwnWords:
+class EchoCheck:
     """Checks that a thought does not copy the prompt, and speaks as the robot.
 
     Attributes:
@@ -72,8 +72,8 @@ class OwnWords:
     prompts: frozenset[tuple[str, ...]]
 
     @classmethod
-    def than(cls, texts: Iterable[str]) -> OwnWords:
-        """Other words than those of these texts."""
+    def against(cls, texts: Iterable[str]) -> EchoCheck:
+        """Against runs of words of these texts."""
         return cls(frozenset(run for text in texts for run in _runs(text)))
 
     def refusals(self, text: str) -> tuple[Refusal, ...]:

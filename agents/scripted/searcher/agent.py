@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
 from agents.scripted.searcher import instruction, search_priors
-from agents.scripted.searcher.instruction import Goal, understand
+from agents.scripted.searcher.instruction import Goal, parse_instruction
 from er_gym.envs.actions import Action
 from er_gym.envs.info import LegalActions, names
 from er_gym.rollout.agent import Decision
@@ -102,7 +102,7 @@ class SearcherAgent:
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """Begin an episode: read the instruction."""
-        self.goals: Sequence[Goal] = understand(task.instruction)
+        self.goals: Sequence[Goal] = parse_instruction(task.instruction)
         self._memory = Memory()
         self._two_transfers = [goal.kind for goal in self.goals] == [
             instruction.PUT,

@@ -298,7 +298,7 @@ _LONGEST = 2_000
 
 
 @lru_cache(maxsize=4096)
-def understand(instruction: str) -> tuple[Goal, ...]:
+def parse_instruction(instruction: str) -> tuple[Goal, ...]:
     """The goals of an instruction in the order in which they are to be done; () if it has none.
 
     Only its first 2,000 characters are read, each run of white space as one.

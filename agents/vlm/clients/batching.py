@@ -26,7 +26,7 @@ Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
-class Asked(Generic[Job, Result]):
+class PendingJob(Generic[Job, Result]):
     """A job and the future of its result."""
 
     job: Job
@@ -34,7 +34,7 @@ class Asked(Generic[Job, Result]):
 
 
 @dataclass(frozen=True)
-class Failure:
+class BatchFailure:
     """How jobs failed. It does not hold the exception, whose traceback would keep their memory
     alive."""
 
@@ -42,21 +42,21 @@ class Failure:
     message: str
 
     @classmethod
-    def of(cls, error: Exception) -> Failure:
+    def of(cls, error: Exception) -> BatchFailure:
         """The failure that an exception is."""
         words = " ".join(str(error).split())
         if not isinstance(error, (CannotGoOn, ModelError)):
             words = f"{type(error).__name__}: {words}"
         return cls(type(error), words)
 
-    def tell(self, asked: Asked[Any, Any]) -> None:
+    def tell(self, pending: PendingJob[Any, Any]) -> None:
         """Make it the answer to a job."""
         kind = CannotGoOn if issubclass(self.kind, CannotGoOn) else ModelError
         with contextlib.suppress(InvalidStateError):  # it has its answer, or nobody waits for it
-            asked.answer.set_exception(kind(self.message))
+            pending.answer.set_exception(kind(self.message))
 
 
-CLOSED = Failure(CannotGoOn, "the model has been closed")
+CLOSED = BatchFailure(CannotGoOn, "the model has been closed")
 
 
 class SteppedJobs(Generic[Job, State, Result]):
@@ -89,10 +89,10 @@ class SteppedJobs(Generic[Job, State, Result]):
     ) -> None:
         self._begin, self._step, self._result = begin, step, result
         self._size, self._wait = size, wait
-        self._running: list[tuple[Asked[Job, Result], State]] = []
-        self._again: deque[Asked[Job, Result]] = deque()
-        self._alone: deque[Asked[Job, Result]] = deque()
-        self.waiting: queue.SimpleQueue[Asked[Job, Result] | None] = queue.SimpleQueue()
+        self._running: list[tuple[PendingJob[Job, Result], State]] = []
+        self._again: deque[PendingJob[Job, Result]] = deque()
+        self._alone: deque[PendingJob[Job, Result]] = deque()
+        self.waiting: queue.SimpleQueue[PendingJob[Job, Result] | None] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self.closed = False
         # A daemon: a program that ends without close() ends all the same.
@@ -106,15 +106,15 @@ class SteppedJobs(Generic[Job, State, Result]):
             ModelError: the job failed.
             CannotGoOn: no job can succeed any more, or :meth:`close` was called.
         """
-        asked: Asked[Job, Result] = Asked(job)
+        pending: PendingJob[Job, Result] = PendingJob(job)
         try:
             with self._lock:
                 if self.closed:
                     raise CannotGoOn(CLOSED.message)
-                self.waiting.put(asked)
-            return asked.answer.result()
+                self.waiting.put(pending)
+            return pending.answer.result()
         except BaseException:  # Ctrl-C, for example: nobody waits for the result any longer
-            asked.answer.cancel()
+            pending.answer.cancel()
             raise
 
     def close(self) -> None:
@@ -133,7 +133,7 @@ class SteppedJobs(Generic[Job, State, Result]):
         finally:  # closed, or a job raised a BaseException: no caller may wait for ever
             with self._lock:
                 self.closed = True
-            for each in (*(asked for asked, _ in self._running), *self._again, *self._alone):
+            for each in (*(pending for pending, _ in self._running), *self._again, *self._alone):
                 CLOSED.tell(each)
             while not self.waiting.empty():
                 if (left := self.waiting.get()) is not None:
@@ -152,14 +152,14 @@ class SteppedJobs(Generic[Job, State, Result]):
             self._step([state for _, state in self._running])
             results = [self._result(state) for _, state in self._running]
         except Exception as error:
-            self._failed(Failure.of(error))
+            self._failed(BatchFailure.of(error))
             return
         going_on = []
-        for (asked, state), result in zip(self._running, results, strict=True):
+        for (pending, state), result in zip(self._running, results, strict=True):
             if result is None:
-                going_on.append((asked, state))
+                going_on.append((pending, state))
             else:
-                asked.answer.set_result(result)
+                pending.answer.set_result(result)
         self._running = going_on
 
     def _take_in(self) -> None:
@@ -167,16 +167,16 @@ class SteppedJobs(Generic[Job, State, Result]):
         wait = 0.0 if self._running else self._wait
         until = 0.0
         while len(self._running) < self._size:
-            asked = self._next(until)
-            if asked is None:
+            pending = self._next(until)
+            if pending is None:
                 return
             until = until or time.monotonic() + wait
             try:
-                self._running.append((asked, self._begin(asked.job)))
+                self._running.append((pending, self._begin(pending.job)))
             except Exception as error:
-                Failure.of(error).tell(asked)
+                BatchFailure.of(error).tell(pending)
 
-    def _next(self, until: float) -> Asked[Job, Result] | None:
+    def _next(self, until: float) -> PendingJob[Job, Result] | None:
         """The next job, for which it waits until then (monotonic seconds) or, where none runs, for
         ever; None if there is none, or once it is closed."""
         if self._again:
@@ -184,40 +184,40 @@ class SteppedJobs(Generic[Job, State, Result]):
         while True:
             left = max(0.0, until - time.monotonic()) if self._running else None
             try:
-                asked = self.waiting.get(timeout=left)
+                pending = self.waiting.get(timeout=left)
             except queue.Empty:
                 return None
-            if asked is None or asked.answer.set_running_or_notify_cancel():
-                return asked
+            if pending is None or pending.answer.set_running_or_notify_cancel():
+                return pending
 
-    def _failed(self, failure: Failure) -> None:
+    def _failed(self, failure: BatchFailure) -> None:
         """Begin the running jobs anew, or end them."""
-        jobs = [asked for asked, _ in self._running]
+        jobs = [pending for pending, _ in self._running]
         self._running = []
         if len(jobs) == 1 or issubclass(failure.kind, CannotGoOn):
-            for asked in jobs:
-                failure.tell(asked)
+            for pending in jobs:
+                failure.tell(pending)
         elif issubclass(failure.kind, MemoryError):
             self._size = len(jobs) // 2
             self._again.extend(jobs)
         else:
             self._alone.extend(jobs)
 
-    def _do_alone(self, asked: Asked[Job, Result]) -> None:
+    def _do_alone(self, pending: PendingJob[Job, Result]) -> None:
         try:
-            state = self._begin(asked.job)
+            state = self._begin(pending.job)
             while (result := self._result(state)) is None:
                 if self.closed:
                     return
                 self._step([state])
         except Exception as error:
-            Failure.of(error).tell(asked)
+            BatchFailure.of(error).tell(pending)
         else:
-            asked.answer.set_result(result)
+            pending.answer.set_result(result)
 
 
 @dataclass
-class OneStep(Generic[Job, Result]):
+class SingleStep(Generic[Job, Result]):
     """The state of a job that one step does.
 
     Attributes:
@@ -231,7 +231,7 @@ class OneStep(Generic[Job, Result]):
 
 def batches(
     run: Callable[[Sequence[Job]], Sequence[Result]], size: int, wait: float
-) -> SteppedJobs[Job, OneStep[Job, Result], Result]:
+) -> SteppedJobs[Job, SingleStep[Job, Result], Result]:
     """Jobs that are done in whole batches, each in one step.
 
     Args:
@@ -240,9 +240,9 @@ def batches(
         wait: seconds that a job waits for others.
     """
 
-    def step(states: Sequence[OneStep[Job, Result]]) -> None:
+    def step(states: Sequence[SingleStep[Job, Result]]) -> None:
         results = run([each.job for each in states])
         for state, result in list(zip(states, results, strict=True)):
             state.result = result
 
-    return SteppedJobs(OneStep, step, lambda state: state.result, size, wait)
+    return SteppedJobs(SingleStep, step, lambda state: state.result, size, wait)

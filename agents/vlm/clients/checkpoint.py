@@ -72,7 +72,7 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
         adapters = (*adapters, _adapter(local.adapter))
     # An adapter may have brought tokens of its own, and then it has a tokenizer that knows them.
     words = next((str(a) for a in reversed(adapters) if (a / _TOKENIZER).is_file()), base)
-    with _errors_in_one_line(f"{path} cannot be loaded"):
+    with _errors_summarised(f"{path} cannot be loaded"):
         config = transformers.AutoConfig.from_pretrained(base, **where)
         tokenizer = transformers.AutoTokenizer.from_pretrained(words, **where)
         template = template_of(words, **where) or template_of(base, **where)
@@ -81,7 +81,7 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
         raise ValueError(f"{path} has no vision; set the agent's setting sees to text")
     if not (template or tokenizer.chat_template):
         raise ValueError(f"{path} has no chat template, so it cannot hold a conversation")
-    with _errors_in_one_line(f"{path} cannot be loaded"):
+    with _errors_summarised(f"{path} cannot be loaded"):
         # With Pillow: a whole AutoProcessor needs torchvision, for videos only.
         image_processor = (
             transformers.AutoImageProcessor.from_pretrained(base, backend="pil", **where)
@@ -93,7 +93,7 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
             f"{path} does not process pictures as Qwen's models do "
             f"({type(image_processor).__name__}); run it on a server"
         )
-    with _errors_in_one_line(f"{path} cannot be loaded"):
+    with _errors_summarised(f"{path} cannot be loaded"):
         model, missing = load_weights(
             base,
             config,
@@ -113,7 +113,7 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
         repetition_penalty=model.generation_config.repetition_penalty,
     )
     for number, adapter in enumerate(adapters, 1):
-        with _errors_in_one_line(f"the adapter {adapter} does not fit the model"):
+        with _errors_summarised(f"the adapter {adapter} does not fit the model"):
             model = with_adapter(model, adapter, merge=number < len(adapters))
     identity = _identity(base, adapters, settings, model)
     return Checkpoint(model.eval(), tokenizer, image_processor, template, ends, identity)
@@ -129,7 +129,7 @@ def template_of(path: str, **where: bool) -> str | None:
     return found if isinstance(found, str) else None
 
 
-def one_line(error: Exception) -> str:
+def error_summary(error: Exception) -> str:
     """A library's error in one line of limited length."""
     return f"{type(error).__name__}: {' '.join(str(error).split())}"[:_LONGEST_WORDS]
 
@@ -210,10 +210,10 @@ def _files(path: str) -> list[list[Any]]:
 
 
 @contextmanager
-def _errors_in_one_line(what: str) -> Iterator[None]:
+def _errors_summarised(what: str) -> Iterator[None]:
     """Turn any error that a broken checkpoint causes in the libraries into a ValueError of one
     line."""
     try:
         yield
     except Exception as error:
-        raise ValueError(f"{what}: {one_line(error)}") from None
+        raise ValueError(f"{what}: {error_summary(error)}") from None

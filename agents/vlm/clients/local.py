@@ -2,7 +2,7 @@
 variants; for text-only agents, any language model with a chat template.
 
 What the model computes for the turns of a conversation is kept for its next turns
-(:mod:`agents.vlm.clients.kept_turns`), unless ``local.reuse`` is off.
+(:mod:`agents.vlm.clients.kv_cache`), unless ``local.reuse`` is off.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from agents.vlm.chat import (
     template_message,
 )
 from agents.vlm.clients.batching import CLOSED, SteppedJobs, batches
-from agents.vlm.clients.checkpoint import load, one_line
-from agents.vlm.clients.kept_turns import (
-    KeptConversations,
-    KeptTurns,
+from agents.vlm.clients.checkpoint import error_summary, load
+from agents.vlm.clients.kv_cache import (
+    CachedTurns,
+    ConversationCache,
     conversation_name,
     joined_past,
     memory_for,
@@ -108,7 +108,7 @@ class LocalClient:
         self._closing = threading.Event()
         local = settings.local
         memory = memory_for(self._model) if local.reuse else 0
-        self._kept = KeptConversations(memory) if memory else None
+        self._kept = ConversationCache(memory) if memory else None
         self._packed: PackedModel | None = None
         self._jobs: SteppedJobs[EncodedPrompt, Any, Reply]
         if self._kept is not None and can_be_packed(self._model):
@@ -203,7 +203,7 @@ class LocalClient:
         except (jinja2.TemplateError, TypeError) as error:
             raise CannotGoOn(
                 f"{self._name}: its chat template does not accept this conversation: "
-                f"{one_line(error)}"
+                f"{error_summary(error)}"
             ) from None
         return text
 
@@ -230,7 +230,7 @@ class LocalClient:
             )
         except (OSError, ValueError) as error:
             raise ConversationRefused(
-                f"a picture cannot be processed: {one_line(error)}", REQUEST
+                f"a picture cannot be processed: {error_summary(error)}", REQUEST
             ) from None
         return seen["pixel_values"], seen["image_grid_thw"]
 
@@ -410,7 +410,7 @@ class LocalClient:
         return ids
 
 
-def _grids_by_digest(kept: KeptTurns | None) -> dict[str, torch.Tensor]:
+def _grids_by_digest(kept: CachedTurns | None) -> dict[str, torch.Tensor]:
     """The grids of the pictures that were processed in earlier turns, (1, 3) each."""
     if kept is None or kept.grids is None:
         return {}
@@ -436,6 +436,6 @@ def _explained(error: RuntimeError, rows: Sequence[EncodedPrompt]) -> Exception:
         )
     if isinstance(error, getattr(torch, "AcceleratorError", ())):
         return CannotGoOn(
-            f"the device failed, and this process cannot use it again: {one_line(error)}"
+            f"the device failed, and this process cannot use it again: {error_summary(error)}"
         )
     return error

@@ -72,7 +72,7 @@ def _merged(base: Path, adapters: tuple[Path, ...]) -> Any:
     import transformers
 
     from agents.vlm.clients.adapters import with_adapter
-    from agents.vlm.clients.checkpoint import load_weights, one_line
+    from agents.vlm.clients.checkpoint import error_summary, load_weights
 
     try:
         config = transformers.AutoConfig.from_pretrained(base, local_files_only=True)
@@ -81,7 +81,7 @@ def _merged(base: Path, adapters: tuple[Path, ...]) -> Any:
             model = with_adapter(model, adapter, merge=True)
     except Exception as error:  # what broken files make of the libraries can be any exception
         raise ValueError(
-            f"{adapters[-1]} cannot be merged into {base}: {one_line(error)}"
+            f"{adapters[-1]} cannot be merged into {base}: {error_summary(error)}"
         ) from None
     return model
 

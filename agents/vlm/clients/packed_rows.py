@@ -19,7 +19,7 @@ import transformers
 from torch.nn import functional
 from transformers import AttentionInterface
 
-from agents.vlm.clients.kept_turns import KeptTurns, grown, positions_of, whole_model
+from agents.vlm.clients.kv_cache import CachedTurns, grown, positions_of, whole_model
 from agents.vlm.clients.padded_batch import EncodedPrompt, new_pictures
 from agents.vlm.clients.seeded_sampling import SeededSampling
 from agents.vlm.settings import Sampling
@@ -60,10 +60,10 @@ class PackedRow:
         """The tokens to be processed next."""
         return self.said[-1:] or self.prompt.ids[self.done :]
 
-    def turns(self) -> KeptTurns:
+    def turns(self) -> CachedTurns:
         """What has been processed. This row must not be used afterwards."""
         ids = [*self.prompt.ids, *self.said][: self.done]
-        return KeptTurns(ids, self.prompt.pictures, self.prompt.grids, self._layers)
+        return CachedTurns(ids, self.prompt.pictures, self.prompt.grids, self._layers)
 
     def with_new(
         self, layer: int, keys: torch.Tensor, values: torch.Tensor

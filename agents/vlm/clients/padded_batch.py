@@ -9,8 +9,8 @@ from typing import Any
 import torch
 from transformers import DynamicCache
 
-from agents.vlm.clients.kept_turns import (
-    KeptTurns,
+from agents.vlm.clients.kv_cache import (
+    CachedTurns,
     Layers,
     copied,
     layers_of,
@@ -43,7 +43,7 @@ class EncodedPrompt:
     seed: int
     thinking: bool
     name: str
-    kept: KeptTurns | None = None
+    kept: CachedTurns | None = None
     reused: int = 0
 
     @property
@@ -123,7 +123,7 @@ class PaddedBatch:
             inputs["position_ids"] = self._positions(model, image_token)
         return inputs
 
-    def turns(self, said: Sequence[list[int]], cache: DynamicCache) -> Iterator[KeptTurns]:
+    def turns(self, said: Sequence[list[int]], cache: DynamicCache) -> Iterator[CachedTurns]:
         """What the model has computed for each conversation and the reply to it.
 
         Args:
@@ -135,7 +135,7 @@ class PaddedBatch:
             before, between = self._gaps[number]
             start, end = before + row.reused + between, min(self.length + len(reply), kept)
             new = layers_of(cache, number, start, end)
-            yield KeptTurns(
+            yield CachedTurns(
                 [*row.ids, *reply[: end - self.length]],
                 row.pictures,
                 row.grids,

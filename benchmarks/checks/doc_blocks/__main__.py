@@ -107,7 +107,7 @@ def main(pages: tuple[str, ...], light: bool, listed: bool, times: bool) -> None
         _print_reasons(parts, pages)
         return
     end_on_sigterm()
-    end(check(pages, light=light, timed=times) + Tally("stale rows", short=len(rows)))
+    end(check(pages, light=light, timed=times) + Tally("stale rows", failed=len(rows)))
 
 
 def _print_reasons(parts: Sequence[Part], pages: Sequence[str]) -> None:

@@ -61,7 +61,7 @@ NEVER: Mapping[str, tuple[str, ...]] = {
         "docs/finetuning.md: er-gym finetune",
         "docs/finetuning.md: er-gym bench",
         "docs/finetuning.md: accelerate launch",
-        "docs/ladder.md: python -m benchmarks.eyes",
+        "docs/ladder.md: python -m benchmarks.vision_probe",
         "docs/serving.md: er-gym serve",
         "docs/serving.md: import time, xllamacpp",
     ),

@@ -17,7 +17,7 @@ from benchmarks.checks.misuse.episodes import copies, handed_out, out_of_turn
 from benchmarks.checks.misuse.tries import Try
 from benchmarks.checks.misuse.values import actions, arguments, resets
 from benchmarks.checks.misuse.wrapping import orders, registry, vectors
-from benchmarks.harness.tally import Tally, holds, tally
+from benchmarks.harness.tally import Tally, has_words, tally
 
 _LONGEST = 500
 """Characters of a message."""
@@ -27,7 +27,7 @@ GROUPS = (actions, arguments, out_of_turn, resets, copies, handed_out, orders, r
 def check(words: Sequence[str] = ()) -> Tally:
     """Try all whose names hold the words, and print the failures."""
     warnings.simplefilter("ignore")
-    every = (each for group in GROUPS for each in group() if holds(each.name, words))
+    every = (each for group in GROUPS for each in group() if has_words(each.name, words))
     return tally("misuses", ((each.name, _problems(each)) for each in every))
 
 

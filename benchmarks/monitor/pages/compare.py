@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from fastapi import Request, Response
 
 from benchmarks.monitor.comparison import CHANGES, Pair, by_type, difference, pairs_of
+from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.episode_view import EpisodeView, view_of
 from benchmarks.monitor.failures import FAILURES
 from benchmarks.monitor.listing import page_number, page_of
-from benchmarks.monitor.places import Place
-from benchmarks.monitor.site import NothingThere, Routes, Site, or_nothing
+from benchmarks.monitor.site import NotFound, Routes, Site, or_nothing
 from er_gym.rollout.run_directory import RunDirectory
 
 MOST_RUNS = 12
@@ -23,13 +23,13 @@ class Side:
     """One of two episodes.
 
     Attributes:
-        place: its run's directory.
+        directory: of its run.
         agent: who plays.
         episode: the episode.
         parts_at: the number of the first step that the other episode does not have there.
     """
 
-    place: Place
+    directory: Directory
     agent: str
     episode: EpisodeView
     parts_at: int
@@ -48,8 +48,10 @@ class ComparePages:
     def compare(self, request: Request) -> Response:
         """Every run beside the first, and which tasks changed in one of them."""
         asked = list(dict.fromkeys(request.query_params.getlist("of")))[:MOST_RUNS]
-        places = [self._site.place(id, "run") for id in asked]
-        runs = [(self._site.summary(place), self._site.rows(place)) for place in places]
+        directories = [self._site.directory(id, "run") for id in asked]
+        runs = [
+            (self._site.summary(directory), self._site.rows(directory)) for directory in directories
+        ]
         by = request.query_params.get("by", "")
         chosen = asked.index(by) if by in asked[1:] else 1
         change = request.query_params.get("change", "")
@@ -66,7 +68,7 @@ class ComparePages:
             if (pair.change == change if change else pair.change in ("gained", "lost"))
         ]
         flipped.sort(key=lambda pair: (CHANGES.index(pair.change), pair.key))
-        counts = [self._site.failures(place) for place in places]
+        counts = [self._site.failures(directory) for directory in directories]
         variables = {
             "runs": [summary for summary, _ in runs],
             "failures": [
@@ -75,7 +77,9 @@ class ComparePages:
                 if any(counted.number(kind) for counted in counts)
             ],
             "counted": [(counted.done, counted.failed) for counted in counts],
-            "every": [self._site.summary(place) for place in self._site.places.of_kind("run")],
+            "every": [
+                self._site.summary(directory) for directory in self._site.directories.of_kind("run")
+            ],
             "asked": asked,
             "first": runs[0][0] if runs else None,
             "second": runs[chosen][0] if len(runs) > 1 else None,
@@ -92,18 +96,18 @@ class ComparePages:
         """Two episodes of a task, step by step."""
         asked = request.query_params.getlist("of")
         if len(asked) != 2:
-            raise NothingThere
-        places = [self._site.place(id, "run") for id in asked]
+            raise NotFound
+        directories = [self._site.directory(id, "run") for id in asked]
         with or_nothing():
-            runs = [RunDirectory.open(place.path) for place in places]
+            runs = [RunDirectory.open(directory.path) for directory in directories]
             views = [view_of(run, key) for run in runs]
         parts_at = _parts_at(*views)
         variables = {
             "key": key,
             "asked": asked,
             "sides": [
-                Side(place, run.manifest.agent, view, parts_at)
-                for place, run, view in zip(places, runs, views, strict=True)
+                Side(directory, run.manifest.agent, view, parts_at)
+                for directory, run, view in zip(directories, runs, views, strict=True)
             ],
             "parts_at": parts_at,
             "scripts": ("episode.js",),

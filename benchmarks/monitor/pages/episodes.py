@@ -37,11 +37,11 @@ class EpisodePages(ReplayPages):
 
     def episode(self, request: Request, id: str, key: str = "") -> Response:
         """An episode."""
-        place = self._site.place(id, "run")
+        directory = self._site.directory(id, "run")
         chosen = Filter.of(request.query_params)
         with or_nothing():
-            episode = view_of(RunDirectory.open(place.path), key)
-        with self._site.runs.use(place) as view:
+            episode = view_of(RunDirectory.open(directory.path), key)
+        with self._site.runs.use(directory) as view:
             before, after = neighbours([row.key for row in view.chosen(chosen)], key)
             summary = view.summary()
         variables = {
@@ -60,15 +60,15 @@ class EpisodePages(ReplayPages):
         return manifest, record
 
     def _picture(self, id: str, key: str, n: int) -> Path | None:
-        place = self._site.place(id, "run")
+        directory = self._site.directory(id, "run")
         with or_nothing():
-            pictures = view_of(RunDirectory.open(place.path), key).pictures
-        return picture_file(place.path, pictures[n]) if 0 <= n < len(pictures) else None
+            pictures = view_of(RunDirectory.open(directory.path), key).pictures
+        return picture_file(directory.path, pictures[n]) if 0 <= n < len(pictures) else None
 
     def video(self, id: str, key: str = "") -> Response:
         """An episode as an animated WebP, to keep."""
         with or_nothing(), self._filming:  # one at a time: it is the costliest page
-            run = RunDirectory.open(self._site.place(id, "run").path)
+            run = RunDirectory.open(self._site.directory(id, "run").path)
             data = as_webp(film(run, key, self._worlds))
         named = f'attachment; filename="{file_stem(key)}.webp"'
         return Response(data, media_type="image/webp", headers={"Content-Disposition": named})

@@ -38,7 +38,8 @@ class LivePages:
 
     def _version(self, of: frozenset[str]) -> object:
         """What changes whenever one of the directories does."""
-        places = [each for each in self._site.places.all() if "*" in of or each.id in of]
+        directories = [each for each in self._site.directories.all() if "*" in of or each.id in of]
         return tuple(
-            (place.id, self._site.version(place, closely=place.id in of)) for place in places
+            (directory.id, self._site.version(directory, closely=directory.id in of))
+            for directory in directories
         )

@@ -16,9 +16,9 @@ from agents.zoo.index import PREFIX, model_names
 from benchmarks.monitor.news import news
 from benchmarks.monitor.play.forms import BadForm, Forms
 from benchmarks.monitor.play.plan import plan, playable, run_path
-from benchmarks.monitor.play.session import Moment, Order, Refused, Session
+from benchmarks.monitor.play.session import Order, Refused, Session, SessionState
 from benchmarks.monitor.play.sessions import Sessions
-from benchmarks.monitor.site import NothingThere, Routes, Site
+from benchmarks.monitor.site import NotFound, Routes, Site
 from er_gym.envs.actions import parse
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.tasks import verbs
@@ -170,7 +170,12 @@ class PlayPages:
         return self._page(request, session, session.now)
 
     def _page(
-        self, request: Request, session: Session, now: Moment, problem: str = "", status: int = 200
+        self,
+        request: Request,
+        session: Session,
+        now: SessionState,
+        problem: str = "",
+        status: int = 200,
     ) -> Response:
         run = session.plan.path.resolve()
         variables = {
@@ -181,7 +186,7 @@ class PlayPages:
             "keys": KEYS,
             "problem": problem,
             "secret": self._forms.secret,
-            "place": self._site.places.at(run, "run"),
+            "directory": self._site.directories.at(run, "run"),
             "scripts": ("play.js",),
         }
         return self._site.show(request, "play_session.html", variables, status)
@@ -207,7 +212,7 @@ class PlayPages:
         """A picture of a turn of the episode in play."""
         pictures = self._session(id).now.shown.get(step, ())
         if not 0 <= n < len(pictures):
-            raise NothingThere
+            raise NotFound
         picture = pictures[n]
         return Response(picture.data, media_type=picture.media_type)
 
@@ -223,7 +228,7 @@ class PlayPages:
     def _session(self, id: str) -> Session:
         session = self.sessions.get(id)
         if session is None:
-            raise NothingThere
+            raise NotFound
         return session
 
 
@@ -235,8 +240,8 @@ def _run_in(path: Path) -> RunDirectory | None:
         return None
 
 
-def _asked(session: Session, form: Mapping[str, str]) -> Moment:
-    """Do what a form asks for; returns the moment before.
+def _asked(session: Session, form: Mapping[str, str]) -> SessionState:
+    """Do what a form asks for; returns the state before.
 
     Raises:
         Refused: it cannot be done.

@@ -13,7 +13,7 @@ from markupsafe import Markup
 from benchmarks.monitor import formats
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.room_map import room_map
-from benchmarks.monitor.site import AN_HOUR, NothingThere, Routes, Site, or_nothing
+from benchmarks.monitor.site import AN_HOUR, NotFound, Routes, Site, or_nothing
 from benchmarks.monitor.world import CannotReplay, Worlds
 from er_gym.data.pictures import encode_picture
 from er_gym.rollout.records import EpisodeRecord
@@ -53,7 +53,7 @@ class ReplayPages(ABC):
         """An episode, and the manifest of its run.
 
         Raises:
-            NothingThere: there is none.
+            NotFound: there is none.
             CannotReplay: there is no manifest.
         """
 
@@ -62,7 +62,7 @@ class ReplayPages(ABC):
         """The file of an episode's picture; None if there is none.
 
         Raises:
-            NothingThere: there is no such episode.
+            NotFound: there is no such episode.
         """
 
     def picture(self, id: str, key: str = "", n: int = 0) -> Response:
@@ -70,7 +70,7 @@ class ReplayPages(ABC):
         file = self._picture(id, key, n)
         kind = PICTURE_KINDS.get(file.suffix.lower()) if file else None
         if file is None or kind is None:
-            raise NothingThere
+            raise NotFound
         with or_nothing():
             return Response(file.read_bytes(), media_type=kind, headers=AN_HOUR)
 
@@ -88,7 +88,7 @@ class ReplayPages(ABC):
         with or_nothing():
             manifest, record = self._played(id, key)
             if not 0 <= n < len(record.steps):
-                raise NothingThere
+                raise NotFound
             picture = self._worlds.frame(manifest, record, n)
         return Response(encode_picture(picture), media_type="image/jpeg", headers=AN_HOUR)
 

@@ -29,7 +29,7 @@ def _paper_rows() -> list[tuple[str, Mapping[str, float], float]]:
 
 def run_variables(view: RunView, chosen: Filter) -> dict[str, Any]:
     """What the page of a run says."""
-    groups, types = view.tallies()
+    groups, types = view.success_counts()
     choices = view.choices()
     return {
         "run": view.summary(),
@@ -56,16 +56,18 @@ class RunPages:
 
     def home(self, request: Request) -> Response:
         """All runs."""
-        summaries = [self._site.summary(place) for place in self._site.places.of_kind("run")]
-        summaries.sort(key=lambda each: (each.state != "playing", each.place.name))
-        variables = {"runs": summaries, "roots": self._site.places.roots, "live": "*"}
+        summaries = [
+            self._site.summary(directory) for directory in self._site.directories.of_kind("run")
+        ]
+        summaries.sort(key=lambda each: (each.state != "playing", each.directory.name))
+        variables = {"runs": summaries, "roots": self._site.directories.roots, "live": "*"}
         return self._site.show(request, "home.html", variables)
 
     def run(self, request: Request, id: str) -> Response:
         """A run."""
-        place = self._site.place(id, "run")
+        directory = self._site.directory(id, "run")
         chosen = Filter.of(request.query_params)
-        with self._site.runs.use(place) as view:
+        with self._site.runs.use(directory) as view:
             view.count_failures(_COUNT_SECONDS)
             variables = run_variables(view, chosen)
         return self._site.show(request, "run.html", {**variables, "live": id})

@@ -8,7 +8,7 @@ from fastapi import Request, Response
 from fastapi.responses import RedirectResponse
 
 from benchmarks.monitor.language import LANGUAGES
-from benchmarks.monitor.site import LANGUAGE, NothingThere, Routes
+from benchmarks.monitor.site import LANGUAGE, NotFound, Routes
 
 _KINDS = {".css": "text/css; charset=utf-8", ".js": "text/javascript; charset=utf-8"}
 
@@ -32,14 +32,14 @@ class StaticPages:
     def file(self, name: str) -> Response:
         """A file that the pages need."""
         if name not in self._files:
-            raise NothingThere
+            raise NotFound
         content, kind = self._files[name]
         return Response(content, media_type=kind)
 
     def language(self, request: Request, name: str) -> Response:
         """Choose a language, and go back."""
         if name not in LANGUAGES:
-            raise NothingThere
+            raise NotFound
         back = request.query_params.get("back", "/")
         answer = RedirectResponse(back if _is_here(back) else "/", 303)
         answer.set_cookie(LANGUAGE, name, max_age=10**8, httponly=True, samesite="strict")

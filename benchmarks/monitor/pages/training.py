@@ -7,9 +7,9 @@ from typing import Any
 
 from fastapi import Request, Response
 
-from benchmarks.monitor.places import Place
-from benchmarks.monitor.run_view import RunSummary, Tally
-from benchmarks.monitor.site import NothingThere, Routes, Site
+from benchmarks.monitor.directories import Directory
+from benchmarks.monitor.run_view import RunSummary, SuccessCount
+from benchmarks.monitor.site import NotFound, Routes, Site
 from benchmarks.monitor.training_view import (
     Trained,
     curves,
@@ -37,62 +37,69 @@ class TrainingPages:
     def all(self, request: Request) -> Response:
         """All that trains."""
         rows: list[Any] = []
-        for place in self._site.places.all():
-            if place.kind in _PLANS:
-                rows.append(self._plan(place)[0])
-            elif place.kind in _CHARTS:
-                rows.append(trained(place))
-        rows.sort(key=lambda row: (row.state != "running", row.place.name))
-        variables = {"rows": rows, "roots": self._site.places.roots, "live": "*", "at": "training"}
+        for directory in self._site.directories.all():
+            if directory.kind in _PLANS:
+                rows.append(self._plan(directory)[0])
+            elif directory.kind in _CHARTS:
+                rows.append(trained(directory))
+        rows.sort(key=lambda row: (row.state != "running", row.directory.name))
+        variables = {
+            "rows": rows,
+            "roots": self._site.directories.roots,
+            "live": "*",
+            "at": "training",
+        }
         return self._site.show(request, "training.html", variables)
 
     def one(self, request: Request, id: str) -> Response:
         """A policy, a fine-tuning, a ladder or an ablation."""
-        place = self._site.places.get(id)
-        if place is not None and place.kind in _PLANS:
-            return self._show_plan(request, place)
-        if place is None or place.kind not in _CHARTS:
-            raise NothingThere
+        directory = self._site.directories.get(id)
+        if directory is not None and directory.kind in _PLANS:
+            return self._show_plan(request, directory)
+        if directory is None or directory.kind not in _CHARTS:
+            raise NotFound
         t = self._site.translator(request)
-        with self._curves.use(place) as tail:
-            run: Trained = trained(place, tail.last if tail.lines else None)
-            charts = _CHARTS[place.kind](tail, t)
+        with self._curves.use(directory) as tail:
+            run: Trained = trained(directory, tail.last if tail.lines else None)
+            charts = _CHARTS[directory.kind](tail, t)
         variables = {"run": run, "charts": charts, "live": id, "at": "training"}
         return self._site.show(request, "trained.html", variables)
 
-    def _show_plan(self, request: Request, place: Place) -> Response:
+    def _show_plan(self, request: Request, directory: Directory) -> Response:
         from benchmarks.monitor.plan_view import part_views
 
         t = self._site.translator(request)
-        inside = _Inside(self._site, place)
-        plan, settings = self._plan(place)
+        inside = _Inside(self._site, directory)
+        plan, settings = self._plan(directory)
         variables = {
-            "compared": part_views(place.kind, settings, inside, t) if settings else [],
+            "compared": part_views(directory.kind, settings, inside, t) if settings else [],
             "plan": plan,
             "groups": GROUPS,
-            "live": ",".join([place.id, *(each.id for each in inside.places.values())][:100]),
+            "live": ",".join(
+                [directory.id, *(each.id for each in inside.directories.values())][:100]
+            ),
             "at": "training",
         }
         return self._site.show(request, "plan.html", variables)
 
-    def _plan(self, place: Place) -> tuple[Any, Any]:
+    def _plan(self, directory: Directory) -> tuple[Any, Any]:
         # Imported when it is asked for: it knows how models are trained.
         from benchmarks.monitor.plan_view import plan_view
 
-        return plan_view(place, _Inside(self._site, place))
+        return plan_view(directory, _Inside(self._site, directory))
 
 
 class _Inside:
     """What is in a plan's directory."""
 
-    def __init__(self, site: Site, plan: Place) -> None:
+    def __init__(self, site: Site, plan: Directory) -> None:
         self._site, self._path = site, plan.path
-        every = site.places.all()
-        self.places = {each.path: each for each in every if plan.path in each.path.parents}
+        every = site.directories.all()
+        self.directories = {each.path: each for each in every if plan.path in each.path.parents}
 
-    def place(self, out: str) -> Place | None:
-        return self.places.get(self._path / out)
+    def directory(self, out: str) -> Directory | None:
+        return self.directories.get(self._path / out)
 
-    def run(self, place: Place) -> tuple[RunSummary, Sequence[Tally]]:
-        with self._site.runs.use(place) as view:
-            return view.summary(), view.tallies()[0]
+    def run(self, directory: Directory) -> tuple[RunSummary, Sequence[SuccessCount]]:
+        with self._site.runs.use(directory) as view:
+            return view.summary(), view.success_counts()[0]

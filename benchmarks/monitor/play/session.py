@@ -57,7 +57,7 @@ class Refused(Exception):
 
 
 @dataclass(frozen=True)
-class Deed:
+class PlayedStep:
     """A step that was taken.
 
     Attributes:
@@ -79,7 +79,7 @@ class Deed:
 
 
 @dataclass(frozen=True)
-class Moment:
+class SessionState:
     """A session at one moment.
 
     Attributes:
@@ -89,7 +89,7 @@ class Moment:
         yields: whether the agent plays on after a step that a person decided.
         turn: what the person is shown; None before the first episode.
         shown: the pictures of this episode by the number of their turn.
-        deeds: of this episode.
+        steps: of this episode.
         ended: how the last episode ended; None while one is played.
         done, wanted: how many tasks of the session are finished, and how many it has.
         left: whether the session is closed because the person left.
@@ -102,7 +102,7 @@ class Moment:
     yields: bool = True
     turn: Turn | None = None
     shown: Mapping[int, Sequence[Picture]] = field(default_factory=dict)
-    deeds: Sequence[Deed] = ()
+    steps: Sequence[PlayedStep] = ()
     ended: EpisodeEnded | None = None
     done: int = 0
     wanted: int = 0
@@ -127,7 +127,7 @@ class Session:
         self.plan = plan
         self._idle = idle_seconds
         self._changed = threading.Condition()
-        self._now = Moment(wanted=len(plan.tasks))
+        self._now = SessionState(wanted=len(plan.tasks))
         self._order: Order | Action | None = None
         self._leaving = False
         self._thread = threading.Thread(target=self._play, daemon=True)
@@ -136,11 +136,11 @@ class Session:
     # -- for the pages ---------------------------------------------------------------------------
 
     @property
-    def now(self) -> Moment:
+    def now(self) -> SessionState:
         """The session at this moment."""
         return self._now
 
-    def wait(self, seconds: float, version: int = -1) -> Moment:
+    def wait(self, seconds: float, version: int = -1) -> SessionState:
         """The session once the person can do something, or after some seconds.
 
         Args:
@@ -157,7 +157,7 @@ class Session:
             self._changed.wait_for(settled, seconds)
             return self._now
 
-    def decide(self, action: Action, number: int) -> Moment:
+    def decide(self, action: Action, number: int) -> SessionState:
         """The person decides a step.
 
         Args:
@@ -165,7 +165,7 @@ class Session:
             number: of the turn that the person was shown.
 
         Returns:
-            The moment before.
+            The state before.
 
         Raises:
             Refused: the action is not legal, the turn is another, or the agent could not go on.
@@ -180,11 +180,11 @@ class Session:
                 raise Refused("play_illegal", 422, action=str(action))
             return self._give(action)
 
-    def order(self, order: Order) -> Moment:
+    def order(self, order: Order) -> SessionState:
         """Take an order of the person.
 
         Returns:
-            The moment before.
+            The state before.
 
         Raises:
             Refused: it makes no sense now.
@@ -195,8 +195,8 @@ class Session:
             self._expect("over" if order == "next" else "deciding")
             return self._give(order)
 
-    def pause(self) -> Moment:
-        """The agent is to wait after its step; returns the moment before."""
+    def pause(self) -> SessionState:
+        """The agent is to wait after its step; returns the state before."""
         with self._changed:
             before = self._now
             if before.going:
@@ -210,18 +210,18 @@ class Session:
             self._changed.notify_all()
         self._thread.join(seconds)
 
-    def _expect(self, phase: Phase) -> Moment:
+    def _expect(self, phase: Phase) -> SessionState:
         if self._now.phase != phase or self._order is not None or self._leaving:
             raise Refused("play_closed" if self._now.phase == "closed" else "play_too_late")
         return self._now
 
-    def _give(self, order: Order | Action) -> Moment:
+    def _give(self, order: Order | Action) -> SessionState:
         before, self._order = self._now, order
         self._changed.notify_all()
         return before
 
     def _become(self, **changes: Any) -> None:
-        """Change the moment; whoever waits for that is told."""
+        """Change the state; whoever waits for that is told."""
         with self._changed:
             self._now = replace(self._now, version=self._now.version + 1, **changes)
             self._changed.notify_all()
@@ -258,7 +258,7 @@ class Session:
                 ended=None,
                 turn=None,
                 shown={},
-                deeds=(),
+                steps=(),
                 yields=isinstance(agent, CanBeOverruled),
             )
             return _Directed(agent, self)
@@ -319,7 +319,7 @@ class Session:
                 phase="acting" if going else "deciding",
                 turn=turn,
                 shown={**self._now.shown, turn.number: (*turn.pictures.values(),)},
-                deeds=_answered(self._now.deeds, turn),
+                steps=_answered(self._now.steps, turn),
             )
         if going:
             return None
@@ -329,14 +329,14 @@ class Session:
 
     def decided(self, decision: Decision, said: str) -> None:
         """The agent, or the person in its place, has decided a step."""
-        deed = Deed(
-            number=len(self._now.deeds) + 1,
+        step = PlayedStep(
+            number=len(self._now.steps) + 1,
             action=text_of(decision.action),
             thought=decision.thought[:_LONGEST_TEXT],
             said=said[:_LONGEST_TEXT],
             by_person=bool(decision.by),
         )
-        self._become(deeds=(*self._now.deeds, deed))
+        self._become(steps=(*self._now.steps, step))
 
 
 class _Directed:
@@ -378,9 +378,9 @@ def _last_words(agent: Agent) -> str:
     return "\n".join([*filter(None, [last.reasoning]), *said])
 
 
-def _answered(deeds: Sequence[Deed], turn: Turn) -> Sequence[Deed]:
-    """The deeds with the answer to the last one."""
-    if not deeds:
-        return deeds
-    *before, last = deeds
+def _answered(steps: Sequence[PlayedStep], turn: Turn) -> Sequence[PlayedStep]:
+    """The steps with the answer to the last one."""
+    if not steps:
+        return steps
+    *before, last = steps
     return (*before, replace(last, success=turn.success, feedback=turn.feedback))

@@ -18,11 +18,11 @@ if (board()) {
     await Promise.race([Promise.allSettled(pictures), new Promise((done) => setTimeout(done, 2000))]);
     if (stale()) return;
     // What was opened, and the focus, stay where they are.
-    const open = new Set([...board().querySelectorAll(".deeds details[open]")].map((one) => one.closest("li").value));
+    const open = new Set([...board().querySelectorAll(".played-steps details[open]")].map((one) => one.closest("li").value));
     const pressed = document.activeElement && document.activeElement.dataset.press;
     board().replaceWith(fresh);
     document.title = page.title;
-    for (const details of fresh.querySelectorAll(".deeds details")) details.open = open.has(details.closest("li").value);
+    for (const details of fresh.querySelectorAll(".played-steps details")) details.open = open.has(details.closest("li").value);
     if (pressed) { const button = fresh.querySelector(`[data-press="${pressed}"]`); if (button) button.focus({ preventScroll: true }); }
   };
   const renew = async (event) => {

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, TypeAlias
 
-from er_gym.data.album import Album, Outside, picture_name
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import Collection
 from er_gym.data.dialects import Dialect
+from er_gym.data.picture_folder import PictureFolder, PicturesElsewhere, picture_name
 from er_gym.data.pictures import picture_size
 from er_gym.data.trajectory import Language, PictureRecord, Trajectory
 from er_gym.writing import OutsideFolder, file_stem, inside
@@ -77,7 +77,7 @@ class ExportSummary:
     pictures: int
     shown: int
     linked: int
-    outside: Outside
+    outside: PicturesElsewhere
 
 
 Progress: TypeAlias = Callable[[int, int], None]
@@ -108,11 +108,11 @@ class ExportJob:
     left_out: Counter[str] = field(default_factory=Counter)
     samples: Counter[str] = field(default_factory=Counter)
     counts: Counter[str] = field(default_factory=Counter)
-    album: Album = field(init=False)
+    picture_folder: PictureFolder = field(init=False)
     _folders: set[PurePosixPath] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        self.album = Album(self.folder, copy=self.options.copy)
+        self.picture_folder = PictureFolder(self.folder, copy=self.options.copy)
 
     def trajectories(self) -> Iterator[tuple[Split, Trajectory]]:
         """The trajectories with their splits, one at a time."""
@@ -183,7 +183,7 @@ class ExportJob:
             path = to.relative_to(self.folder)
         except ValueError:
             raise OutsideFolder(f"{to} is not in the output {self.folder}") from None
-        self.album.place(self.source(picture), PurePosixPath(path), self.collection.path)
+        self.picture_folder.place(self.source(picture), PurePosixPath(path), self.collection.path)
 
     def embedded(self, chat: Chat) -> list[dict[str, Any]]:
         """The pictures of a conversation as ``datasets`` keeps them in a file, bytes and name.
@@ -195,8 +195,8 @@ class ExportJob:
         files = [self.source(picture) for picture in chat.pictures]
         for file in files:
             picture_size(file)
-            self.album.look(file, self.collection.path)
-        self.album.pictures += len(files)
+            self.picture_folder.look(file, self.collection.path)
+        self.picture_folder.pictures += len(files)
         return [{"bytes": file.read_bytes(), "path": file.name} for file in files]
 
     def source(self, picture: PictureRecord) -> Path:

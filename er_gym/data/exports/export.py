@@ -98,10 +98,10 @@ def export(
             samples=dict(job.samples),
             turns=job.counts["turns"],
             trained_turns=job.counts["trained_turns"],
-            pictures=job.album.pictures,
+            pictures=job.picture_folder.pictures,
             shown=job.counts["shown"],
-            linked=job.album.linked,
-            outside=job.album.outside,
+            linked=job.picture_folder.linked,
+            outside=job.picture_folder.outside,
         )
         write_atomic(draft / "README.md", _readme(row, summary, options, collection))
         write_atomic(draft / MANIFEST, _manifest(summary, options, held_out, collection))

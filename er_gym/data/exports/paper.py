@@ -25,9 +25,9 @@ from collections import Counter
 from pathlib import PurePosixPath
 from typing import Any
 
-from er_gym.data.album import picture_name
-from er_gym.data.dialects import plain
+from er_gym.data.dialects import without_markup
 from er_gym.data.exports.base import ExportFormat, ExportJob
+from er_gym.data.picture_folder import picture_name
 from er_gym.data.trajectory import TAG_OF_KIND, PictureRecord, Trajectory, Turn
 from er_gym.rollout.records import KeyActionRecord
 from er_gym.tasks import verbs
@@ -116,7 +116,7 @@ def _texts(trajectory: Trajectory, flag: str) -> list[str]:
     last = len(trajectory.turns) - 1
     for index, turn in enumerate(trajectory.turns):
         for thought in turn.thoughts:
-            texts.append(_tagged(TAG_OF_KIND[thought.kind], plain(thought.text)))
+            texts.append(_tagged(TAG_OF_KIND[thought.kind], without_markup(thought.text)))
         if not (index == last and turn.verb == verbs.END and not flag):
             texts.append(_tagged(DECISION, str(turn.action)))
     return texts

@@ -10,8 +10,13 @@ from typing import Any
 import ray
 from ray.exceptions import RayError
 
+from er_gym.rollout.cluster.actor_pool import (
+    ActorOptions,
+    first_line,
+    is_nodes_fault,
+    waiting_message,
+)
 from er_gym.rollout.cluster.actors import Begun, EnvActor, start_actor
-from er_gym.rollout.cluster.crew import Terms, first_line, is_nodes_fault, no_place
 from er_gym.rollout.cluster.origin import Origin
 from er_gym.rollout.env_worker import EnvLost
 from er_gym.rollout.worker_pool import WorkerSetupError
@@ -23,13 +28,13 @@ class RayEnvWorker:
     """See :class:`er_gym.rollout.env_worker.EnvWorker`.
 
     Args:
-        terms: of its actor.
+        options: of its actor.
         slots, env: as :class:`~er_gym.rollout.env_worker.LocalEnvWorker` takes them.
     """
 
-    def __init__(self, terms: Terms, slots: Sequence[int], env: Mapping[str, Any]) -> None:
-        self._terms = terms
-        self._actor = start_actor(EnvActor, terms.options)
+    def __init__(self, options: ActorOptions, slots: Sequence[int], env: Mapping[str, Any]) -> None:
+        self._options = options
+        self._actor = start_actor(EnvActor, options.ray_options)
         self._beginning = self._actor.begin.remote(Origin.here(), [*slots], dict(env))
         self._lock = threading.Lock()
         self._asked: deque[tuple[int, Any]] = deque()
@@ -68,7 +73,7 @@ class RayEnvWorker:
     def _wait_for_place(self) -> None:
         """Wait until the cluster has a place for the actor."""
         while not ray.wait([self._beginning], timeout=_TELL_SECONDS)[0]:
-            self._terms.say(no_place(1, self._terms.options))
+            self._options.say(waiting_message(1, self._options.ray_options))
         try:
             begun: Begun = ray.get(self._beginning)
         except RayError as error:

@@ -25,7 +25,7 @@ from er_gym.rollout.cluster.greeting import problem_at
 from er_gym.rollout.cluster.settings import RaySettings
 
 if TYPE_CHECKING:
-    from er_gym.rollout.cluster.machines import RayMachines
+    from er_gym.rollout.cluster.worker_backend import RayBackend
 
 _FOLDER = "er-gym-ray-"
 _OBJECT_STORE_BYTES = 512 * 2**20
@@ -55,9 +55,9 @@ class RayUnavailable(ValueError):
 
 
 @contextlib.contextmanager
-def ray_machines(
+def ray_backend(
     settings: RaySettings, say: Callable[[str], None], modules: Sequence[Path] = ()
-) -> Iterator[RayMachines]:
+) -> Iterator[RayBackend]:
     """A cluster to work with.
 
     A Ray that is started here listens on loopback alone, and leaves no file behind. A process that
@@ -80,7 +80,7 @@ def ray_machines(
         begin_import("Ray", "ray")
         import ray
 
-        from er_gym.rollout.cluster.machines import RayMachines
+        from er_gym.rollout.cluster.worker_backend import RayBackend
 
         if not ray.is_initialized():
             begin(f"joining the cluster {settings.address}" if settings.address else "starting Ray")
@@ -96,7 +96,7 @@ def ray_machines(
             if not settings.address:
                 stack.callback(_watch(started, folder, say).set)  # called before the shutdown
             stack.enter_context(_quiet())
-        yield RayMachines(settings, say)
+        yield RayBackend(settings, say)
 
 
 @lru_cache

@@ -10,20 +10,20 @@ Job = TypeVar("Job")
 
 
 class WarmQueue(Generic[Job]):
-    """Jobs by room. Within a room they keep their order.
+    """Jobs by affinity key. Those of one key keep their order.
 
     Args:
         jobs: the jobs.
-        room: of a job.
+        affinity_key: of a job.
     """
 
-    def __init__(self, jobs: Iterable[Job], room: Callable[[Job], Hashable]) -> None:
-        self._room = room
-        self._rooms: dict[Hashable, deque[Job]] = {}
+    def __init__(self, jobs: Iterable[Job], affinity_key: Callable[[Job], Hashable]) -> None:
+        self._affinity_key = affinity_key
+        self._by_key: dict[Hashable, deque[Job]] = {}
         self._first: deque[Job] = deque()
         self._length = 0
         for job in jobs:
-            self._rooms.setdefault(room(job), deque()).append(job)
+            self._by_key.setdefault(affinity_key(job), deque()).append(job)
             self._length += 1
 
     def __len__(self) -> int:
@@ -40,14 +40,14 @@ class WarmQueue(Generic[Job]):
         self._length += 1
 
     def take(
-        self, most: int, room: Hashable, others: Iterable[Hashable] = ()
+        self, most: int, key: Hashable, others: Iterable[Hashable] = ()
     ) -> tuple[Hashable, list[Job]]:
-        """Take up to ``most`` jobs of one room; one job, if it was put first.
+        """Take up to ``most`` jobs of one key; one job, if it was put first.
 
         Args:
             most: from 1.
-            room: the room that the worker has loaded; preferred.
-            others: rooms that other workers have loaded; avoided while there are more rooms.
+            key: the affinity key of the jobs that the worker did before; preferred.
+            others: the keys of other workers; avoided while there are more.
 
         Raises:
             IndexError: the queue is empty.
@@ -55,21 +55,21 @@ class WarmQueue(Generic[Job]):
         if self._first:
             self._length -= 1
             job = self._first.popleft()
-            return self._room(job), [job]
-        if room not in self._rooms:
-            room = self._next_room(frozenset(others))
-        jobs = self._rooms[room]
+            return self._affinity_key(job), [job]
+        if key not in self._by_key:
+            key = self._next_key(frozenset(others))
+        jobs = self._by_key[key]
         taken = [jobs.popleft() for _ in range(min(most, len(jobs)))]
         if not jobs:
-            del self._rooms[room]
+            del self._by_key[key]
         self._length -= len(taken)
-        return room, taken
+        return key, taken
 
-    def _next_room(self, others: frozenset[Hashable]) -> Hashable:
-        """The first room that nobody has warm; else the one with the most jobs."""
-        if not self._rooms:
+    def _next_key(self, others: frozenset[Hashable]) -> Hashable:
+        """The first key that nobody has warm; else the one with the most jobs."""
+        if not self._by_key:
             raise IndexError("there are no more jobs")
-        free = next((room for room in self._rooms if room not in others), None)
+        free = next((key for key in self._by_key if key not in others), None)
         if free is not None:
             return free
-        return max(self._rooms, key=lambda each: len(self._rooms[each]))
+        return max(self._by_key, key=lambda each: len(self._by_key[each]))

@@ -103,7 +103,7 @@ def _moved(
     foot = (world.low[i] + world.high[i]) / 2 + offset
     foot[1] = world.low[i, 1] + offset[1]
     clearance = Clearance(world, i, _around(world, foot))
-    obstacle = None if forced else clearance.obstacle(offset, anew=True)
+    obstacle = None if forced else clearance.obstacle(offset, placing=True)
     if obstacle is None:
         shift(world, i, offset)
         return None

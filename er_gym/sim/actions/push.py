@@ -37,7 +37,7 @@ def _slide(world: World, i: int, heading: float, newtons: float) -> None:
         raise ActionFailed("Target Primary Property type incompatible with push/pull.")
     angle = np.radians(heading)
     ahead = np.array([np.sin(angle), 0.0, np.cos(angle)])
-    far = Clearance(world, i).way(ahead, min(newtons / _NEWTONS_PER_METRE, _FARTHEST))
+    far = Clearance(world, i).slide_distance(ahead, min(newtons / _NEWTONS_PER_METRE, _FARTHEST))
     if far <= 0.0:
         return
     under = next(iter(world.parents[i]), None)

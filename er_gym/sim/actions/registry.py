@@ -25,7 +25,7 @@ from difflib import get_close_matches
 from functools import cached_property
 from typing import Any, get_type_hints
 
-from er_gym.plugins import PluginError, added
+from er_gym.plugins import PluginError, added_objects
 from er_gym.sim.actions.conversion import Kind, Unconvertible, kind_of
 from er_gym.sim.errors import (
     INVALID_ACTION,
@@ -215,7 +215,7 @@ def load_added() -> None:
         PluginError: an action cannot be loaded, or is not a registered function.
     """
     expected = f"a function under @{__name__}.action"
-    for found, origin in added("AI2-THOR action", "actions", expected, registers=True):
+    for found, origin in added_objects("AI2-THOR action", "actions", expected, registers=True):
         if not any(each.run is found for signatures in ACTIONS.values() for each in signatures):
             raise PluginError(f"{origin} is {found!r}; give {expected}")
 

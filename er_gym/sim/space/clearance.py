@@ -1,4 +1,4 @@
-"""Whether an object would collide with anything at another place, or on a straight way."""
+"""Whether an object would collide with anything at another place, or on a straight line."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from er_gym.sim.world import World
 _SKIN = 0.02
 """Boxes may overlap by this much without a collision, metres: recorded boxes are generous."""
 _STEP = 0.025
-"""Distance between two tested places on a way, metres."""
+"""Distance between two tested places on the line, metres."""
 _FLOOR = [0, 2]
 
 
@@ -40,11 +40,11 @@ class Clearance:
         high = np.maximum(low + 1e-6, high)  # a box thinner than that is tested at its lower side
         return np.asarray(((self._boxes[:, 0] < high) & (self._boxes[:, 1] > low)).all(axis=1))
 
-    def obstacle(self, offset: NDArray[np.float64], anew: bool = False) -> str | None:
+    def obstacle(self, offset: NDArray[np.float64], placing: bool = False) -> str | None:
         """The obstacle that the object meets after a shift by (3,) metres.
 
         Args:
-            anew: the object is put there and not pushed, so boxes that it overlaps now count as
+            placing: the object is put there and not pushed, so boxes that it overlaps now count as
                 well.
 
         Returns:
@@ -56,12 +56,12 @@ class Clearance:
         ).any():
             return "a wall"
         met = self._overlaps(offset)
-        if not anew:
+        if not placing:
             met &= self._beside
         rows = self._whose[met]
         return self._ids[rows[0]] if len(rows) else None
 
-    def way(self, ahead: NDArray[np.float64], reach: float) -> float:
+    def slide_distance(self, ahead: NDArray[np.float64], reach: float) -> float:
         """How far the object slides along a level (3,) direction until it meets an obstacle,
         metres."""
         for far in np.arange(_STEP, reach + _STEP / 2, _STEP):

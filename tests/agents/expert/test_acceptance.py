@@ -6,7 +6,7 @@ import pytest
 from episodes_by_hand import make_episode, make_key, make_step
 
 from agents.expert.acceptance import PlayedCourse, rejection
-from agents.expert.corrections import DRAWS, beginning_of, beginnings_of
+from agents.expert.corrections import DRAWS, correction_points, first_mistake
 from er_gym.envs.actions import Action
 from er_gym.rollout.records import EpisodeRecord
 
@@ -74,7 +74,7 @@ def test_the_first_action_that_earned_nothing_was_wrong() -> None:
         (("navigate to Sink", "!pickup Egg", "end"), 1),
         (("navigate to Sink", "navigate to Sink", "pickup Egg"), 1),
     ):
-        beginning = beginning_of(failed(*steps, earned=earned))
+        beginning = first_mistake(failed(*steps, earned=earned))
         assert beginning.problem == ""
         assert beginning.first_wrong == earned
         wanted = [make_step(text) for text in steps[: earned + 1]]
@@ -96,10 +96,10 @@ def test_the_expert_can_take_over_after_a_failure() -> None:
             step.model_copy(update={"reward": float(index in earned_at)})
             for index, step in enumerate(episode.steps)
         ]
-        beginning = beginning_of(episode.model_copy(update={"steps": told}), "failure")
+        beginning = first_mistake(episode.model_copy(update={"steps": told}), "failure")
         assert beginning.first_wrong == last, (earned_at, most)
     unusable = failed("navigate to Sink", "error", "!pickup Bowl", earned=1, max_steps=30)
-    assert beginning_of(unusable, "failure").problem == "its first wrong reply names no action"
+    assert first_mistake(unusable, "failure").problem == "its first wrong reply names no action"
 
 
 def test_nobody_takes_over_an_episode_that_is_over() -> None:
@@ -111,9 +111,9 @@ def test_nobody_takes_over_an_episode_that_is_over() -> None:
         ("!pickup Egg", "repeated action", 4),
     ):
         episode = failed(*steps, last, earned=1, max_steps=30, end_reason=reason)
-        assert len(beginning_of(episode, "failure").actions) == kept, (last, reason)
+        assert len(first_mistake(episode, "failure").actions) == kept, (last, reason)
     refused = failed(*["!pickup Egg"] * 4, max_steps=30, end_reason="repeated action")
-    assert len(beginning_of(refused, "failure").actions) == 1
+    assert len(first_mistake(refused, "failure").actions) == 1
 
 
 def test_somebody_can_take_over_anywhere() -> None:
@@ -130,8 +130,8 @@ def test_somebody_can_take_over_anywhere() -> None:
         drawn = set()
         for number in range(60):
             episode = failed(*steps, max_steps=most, end_reason=reason, task_id=f"task-{number}")
-            begun = beginnings_of(episode, "anywhere")
-            assert begun == beginnings_of(episode, "anywhere")
+            begun = correction_points(episode, "anywhere")
+            assert begun == correction_points(episode, "anywhere")
             lengths = [len(each.actions) for each in begun]
             assert lengths == sorted(set(lengths))
             assert len(lengths) == min(DRAWS, last)
@@ -140,18 +140,19 @@ def test_somebody_can_take_over_anywhere() -> None:
             drawn |= {*lengths}
         assert drawn == {*range(1, last + 1)}, (steps, most)
     many = failed(*walk, *["!pickup Egg", "navigate to Bed"] * DRAWS, max_steps=40)
-    begun = beginnings_of(many, "anywhere")  # the refused ones come first
+    begun = correction_points(many, "anywhere")  # the refused ones come first
     assert [len(each.actions) for each in begun] == [6 + 2 * number for number in range(DRAWS)]
     for number in range(20):  # and the last one at which the fourth of a row could be avoided
         row = [*walk, *["!open Fridge", "pickup Egg"] * 4, *["navigate to Bed"] * 4]
         stuck = failed(*row, max_steps=60, end_reason="repeated action", task_id=f"task-{number}")
-        assert [len(each.actions) for each in beginnings_of(stuck, "anywhere")][-1] == len(row) - 1
+        last = correction_points(stuck, "anywhere")[-1]
+        assert len(last.actions) == len(row) - 1
     for episode, problem in (
         (failed("error", "navigate to Sink"), "no action leaves room"),
         (failed("navigate to Sink", max_steps=10), "no action leaves room"),
         (failed("navigate to Sink", error="boom"), "the episode crashed"),
     ):
-        (none,) = beginnings_of(episode, "anywhere")
+        (none,) = correction_points(episode, "anywhere")
         assert problem in none.problem
         assert none.actions == ()
 
@@ -171,6 +172,6 @@ def test_some_episodes_cannot_be_corrected() -> None:
         (failed("navigate to Sink", earned=1, end_reason="max_steps"), "nothing was wrong before"),
         (failed(), "nothing was wrong before"),
     ):
-        beginning = beginning_of(episode)
+        beginning = first_mistake(episode)
         assert problem in beginning.problem
         assert beginning.actions == ()

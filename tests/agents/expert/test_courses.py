@@ -11,10 +11,10 @@ import pytest
 from expert_courses import SEED, TASKS, Played, environment, of_each_type, play
 
 from agents.expert.candidates import Candidate, CandidateSequence
-from agents.expert.corrections import Beginning, beginning_of
+from agents.expert.corrections import Beginning, first_mistake
 from agents.expert.explorer import Strength
 from agents.expert.legs import legs_of
-from agents.expert.places import candidates, draw_places, plan_of
+from agents.expert.places import draw_places, likely_places, plan_of
 from agents.expert.recipe import load_recipe
 from agents.expert.takeover import goals_left
 from agents.scripted.searcher import instruction as words
@@ -250,7 +250,7 @@ def test_a_sure_explorer_visits_the_likeliest_places_first(env: EmbodiedEnv) -> 
                 continue
             visits += 1
             leg = next(one for one in legs_of(each.task) if intent.subgoal in one.subgoals)
-            there = candidates(leg.thing, view.navigable, without=before)
+            there = likely_places(leg.thing, view.navigable, without=before)
             assert (place, intent.plan[0]) == (draw_places(there, 1, Random(0), 0.0)[0], place)
             before.append(place)
     assert visits > 40
@@ -293,7 +293,7 @@ def test_a_correction_begins_like_the_failed_episode(env: EmbodiedEnv) -> None:
     corrected = 0
     for candidate in of_each_type(part, 4):
         failed = play(env, candidate)
-        beginning = beginning_of(failed.episode)
+        beginning = first_mistake(failed.episode)
         if beginning.problem:
             assert not beginning.actions
             continue
@@ -318,7 +318,7 @@ def test_a_correction_can_begin_after_a_failure(env: EmbodiedEnv) -> None:
     corrected = 0
     for candidate in of_each_type(part, 6):
         failed = play(env, candidate).episode
-        beginning = beginning_of(failed, "failure")
+        beginning = first_mistake(failed, "failure")
         if beginning.problem or failed.steps[1 + beginning.first_wrong].success:
             continue
         one = play(env, replace(candidate, beginning=beginning, strength=None))
@@ -335,7 +335,7 @@ def test_the_searcher_takes_over_a_failed_episode(env: EmbodiedEnv) -> None:
     corrected = 0
     for candidate in of_each_type(part, 4):
         failed = play(env, candidate)
-        beginning = beginning_of(failed.episode, "failure")
+        beginning = first_mistake(failed.episode, "failure")
         if beginning.problem:
             continue
         taken_over = replace(candidate, beginning=beginning, strength=None, correct_by="searcher")

@@ -160,11 +160,11 @@ def test_a_model_that_repeats_its_prompt_is_refused(code: str) -> None:
 
 @pytest.mark.parametrize("language", ["en", "zh"])
 def test_what_the_grounded_writer_says_is_no_echo_of_the_prompts(language: Language) -> None:
-    own_words = load_writer_prompts(language).own_words
+    echo_check = load_writer_prompts(language).echo_check
     for index in range(len(episode()[1])):
         asked = ThoughtRequest(known(index, language), ("reflection", "planning"), (150, 150))
         for thought in GroundedWriter().write(asked).thoughts:
-            assert own_words.refusals(thought.text) == ()
+            assert echo_check.refusals(thought.text) == ()
 
 
 def test_a_reply_of_two_megabytes_is_read_at_once_and_not_quoted() -> None:

@@ -16,7 +16,7 @@ from agents.expert.collect import Collector
 from agents.expert.course import Intent, View
 from agents.expert.explorer import ExplorerCourse, Strength
 from agents.expert.legs import Leg, legs_of
-from agents.expert.own_words import split_speech
+from agents.expert.recorded_replies import split_speech
 from agents.expert.replayed_intents import replayed_intent, replayed_purpose
 from agents.expert.task_course import GiveUp
 from agents.expert.thinker import _event

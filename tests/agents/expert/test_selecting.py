@@ -19,9 +19,9 @@ from click.testing import CliRunner
 from sampled_agents import TASKS
 
 from agents.expert.collect import correction_strata
-from agents.expert.own_words import split_speech
 from agents.expert.players import PlaySettings
 from agents.expert.recipe import load_recipe
+from agents.expert.recorded_replies import split_speech
 from agents.expert.replayed import QuotingAgent, Replayers
 from agents.expert.selection import (
     SelectionRules,

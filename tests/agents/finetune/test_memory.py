@@ -10,7 +10,13 @@ import torch
 import transformers
 from tiny_qwen import FAMILIES
 
-from agents.finetune.memory import ModelNumbers, Plan, memory, numbers_of, trained_parameters
+from agents.finetune.memory import (
+    ModelDimensions,
+    TuningSetup,
+    dimensions_of,
+    estimate_memory,
+    trained_parameters,
+)
 
 QWEN_2_5_VL_7B: dict[str, Any] = {
     "model_type": "qwen2_5_vl", "hidden_size": 3584, "intermediate_size": 18944,
@@ -25,12 +31,12 @@ QWEN_2_5_VL_7B: dict[str, Any] = {
 """As its config.json has them, in the layout of 2025."""
 
 
-def plan(**changes: Any) -> Plan:
+def plan(**changes: Any) -> TuningSetup:
     given: dict[str, Any] = {
         "precision": "bfloat16", "lora_rank": None, "freeze": ("vision", "projector"),
         "checkpointing": True, "batch": 1, "tokens": 8_192, "learnt": 2_000, "patches": 20_000,
     }  # fmt: skip
-    return Plan(**{**given, **changes})
+    return TuningSetup(**{**given, **changes})
 
 
 def test_parameters_are_counted_as_the_model_has_them() -> None:
@@ -42,23 +48,25 @@ def test_parameters_are_counted_as_the_model_has_them() -> None:
         with torch.device("meta"):
             model = maker.from_config(config)
         counted = sum(each.numel() for each in model.parameters())
-        assert numbers_of(config.to_dict()).parameters == pytest.approx(counted, rel=0.02), family
+        assert dimensions_of(config.to_dict()).parameters == pytest.approx(counted, rel=0.02), (
+            family
+        )
 
 
 def test_the_paper_s_model_takes_what_is_known_of_it() -> None:
     """Full fine-tuning of 7 B parameters needs several GPUs of 80 GB, LoRA one."""
-    numbers = numbers_of(QWEN_2_5_VL_7B)
-    full = memory(numbers, plan())
+    numbers = dimensions_of(QWEN_2_5_VL_7B)
+    full = estimate_memory(numbers, plan())
     assert 100 < full.total / 2**30 < 160
-    assert memory(numbers, plan(lora_rank=8)).total / 2**30 < 40
-    assert memory(numbers, plan(gpus=8)).total < full.total / 3
+    assert estimate_memory(numbers, plan(lora_rank=8)).total / 2**30 < 40
+    assert estimate_memory(numbers, plan(gpus=8)).total < full.total / 3
     assert trained_parameters(numbers, plan(lora_rank=8)) == 20_185_088  # PEFT counts as many
-    assert full.activations < memory(numbers, plan(checkpointing=False)).activations / 5
+    assert full.activations < estimate_memory(numbers, plan(checkpointing=False)).activations / 5
 
 
 @pytest.mark.parametrize("checkpointing", [False, True])
 def test_activations_are_what_autograd_keeps(checkpointing: bool) -> None:
-    numbers = ModelNumbers(6, 128, 256, 512, 4, 2, 32, tied=False)
+    numbers = ModelDimensions(6, 128, 256, 512, 4, 2, 32, tied=False)
     config = transformers.AutoConfig.for_model(
         "qwen2", hidden_size=128, intermediate_size=256, num_hidden_layers=6, vocab_size=512,
         num_attention_heads=4, num_key_value_heads=2, use_cache=False,
@@ -81,9 +89,11 @@ def test_activations_are_what_autograd_keeps(checkpointing: bool) -> None:
     once = 0
     if checkpointing:  # the hooks do not see the layer that is computed again
         one, two = (
-            memory(replace(numbers, layers=layers), replace(made, checkpointing=False)).activations
+            estimate_memory(
+                replace(numbers, layers=layers), replace(made, checkpointing=False)
+            ).activations
             for layers in (1, 2)
         )
         once = 2 * (two - one)
-    found = memory(numbers, made).activations - once
+    found = estimate_memory(numbers, made).activations - once
     assert found == pytest.approx(sum(kept.values()), rel=0.1)

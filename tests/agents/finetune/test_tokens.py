@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import torch
 
-from agents.finetune.batches import Collator, Order
+from agents.finetune.batches import Collator, EpochSampler
 from agents.finetune.feedback import add_feedback
 from agents.finetune.model_files import open_model
 from agents.finetune.new_model import make_tokenizer
@@ -196,13 +196,13 @@ def test_a_text_only_model_refuses_pictures(models: Any, chats: tuple[Chat, ...]
 
 def test_batches_are_of_similar_length_and_hold_everything_once() -> None:
     lengths = np.random.default_rng(0).integers(100, 1_000, 203)
-    order = Order(lengths.tolist(), 4, seed=0, buckets=True)
+    order = EpochSampler(lengths.tolist(), 4, seed=0, buckets=True)
     first = list(order)
     assert sorted(first) == list(range(203))
-    assert first == list(Order(lengths.tolist(), 4, seed=0, buckets=True))
+    assert first == list(EpochSampler(lengths.tolist(), 4, seed=0, buckets=True))
     order.set_epoch(1)
     assert list(order) != first
-    plain = list(Order(lengths.tolist(), 4, seed=0, buckets=False))
+    plain = list(EpochSampler(lengths.tolist(), 4, seed=0, buckets=False))
     assert _padding(lengths, first) < 0.1 < _padding(lengths, plain)
 
 

@@ -12,12 +12,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import pytest
 
 from agents.vlm.chat import ModelError
-from agents.vlm.clients.batching import OneStep, SteppedJobs, batches
+from agents.vlm.clients.batching import SingleStep, SteppedJobs, batches
 from er_gym.rollout.agent import CannotGoOn
 
 LONG = 60.0  # seconds; only broken code waits so long
 Outcome = str | type[Exception]
-Batches = SteppedJobs[str, OneStep[str, str], str]
+Batches = SteppedJobs[str, SingleStep[str, str], str]
 
 
 class Model:

@@ -17,7 +17,7 @@ from agents.vlm.chat import Message, ModelError
 from agents.vlm.clients.local import LocalClient
 from agents.vlm.clients.model_actors import ModelActors
 from agents.vlm.settings import AgentSettings
-from er_gym.rollout.cluster.session import ray_machines
+from er_gym.rollout.cluster.session import ray_backend
 from er_gym.rollout.cluster.settings import RaySettings
 
 
@@ -40,7 +40,7 @@ def test_copies_reply_as_a_model_here_also_after_one_has_died(model):
     talks = [(Message("user", (f"Where is the mug, {n}?",)),) for n in range(6)]
     here = LocalClient(model, settings())
     wanted = [here.reply(talk, seed) for seed, talk in enumerate(talks)]
-    with ray_machines(RaySettings(), print):
+    with ray_backend(RaySettings(), print):
         actors = ModelActors(model, settings(actors=2, actor_cpus=0.1))
         assert actors.identity == here.identity
         here.close()
@@ -65,5 +65,5 @@ def test_copies_reply_as_a_model_here_also_after_one_has_died(model):
 def test_what_stands_in_the_way_is_one_line(model, tmp_path):
     with pytest.raises(ValueError, match=r"local\.actors needs a cluster: give --executor ray"):
         ModelActors(model, settings(actors=1))
-    with ray_machines(RaySettings(), print), pytest.raises(ValueError, match="empty"):
+    with ray_backend(RaySettings(), print), pytest.raises(ValueError, match="empty"):
         ModelActors(str(tmp_path / "empty"), settings(actors=1, actor_cpus=0.1))

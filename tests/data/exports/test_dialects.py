@@ -11,7 +11,7 @@ import pytest
 from agents.vlm.parsing import parse
 from er_gym.data.chat import IMAGE, Chat, told_by_user, trained_prefixes
 from er_gym.data.collection import Collection
-from er_gym.data.dialects import LastDeed, dialect_names, load_dialect, user_turn
+from er_gym.data.dialects import ActionResult, dialect_names, load_dialect, user_turn
 from er_gym.data.scene_text import Perceived
 from er_gym.data.trajectory import (
     TAG_OF_KIND,
@@ -295,7 +295,7 @@ def test_the_user_tells_how_far_the_things_are_that_the_instruction_names() -> N
         view=[pen, book], views={"behind": [mug]}, held="CD", interactable=["Pen", "Desk"]
     )
     asked = "Put the CD on the Desk, the Pen by the Book, and the Mug in the Drawer."
-    (told,) = user_turn(texts, asked, LastDeed("observe", True, ""), [], now, now)
+    (told,) = user_turn(texts, asked, ActionResult("observe", True, ""), [], now, now)
     assert str(told).splitlines()[-1] == (
         "asked CD held, Desk near, Pen near, Book in view at Shelf, Mug in view, Drawer hidden"
     )

@@ -13,12 +13,12 @@ import pytest
 from agents.vlm.paper_prompts import read_prompts
 from agents.vlm.prompt_set import IMAGE_MARK, LastAction, TurnContext
 from agents.vlm.templates import directory_of, load_templates
-from er_gym.data.album import Outside
 from er_gym.data.chat import IMAGE
 from er_gym.data.collection import Collection
 from er_gym.data.exports import ExportError, ExportOptions, ExportSummary, export
 from er_gym.data.exports.base import room
 from er_gym.data.exports.export import EXPORTS, _readme
+from er_gym.data.picture_folder import PicturesElsewhere
 from er_gym.data.trajectory import Trajectory
 from er_gym.tasks import verbs
 
@@ -236,7 +236,7 @@ def test_the_readme_speaks_of_the_splits_that_there_are(
     assert "There is no split `validation`" in told
     for row in EXPORTS.own.values():
         for samples in ({"train": 3}, {"train": 3, "validation": 2}):
-            summary = ExportSummary(row.name, 5, {}, samples, 9, 9, 9, 9, 9, Outside())
+            summary = ExportSummary(row.name, 5, {}, samples, 9, 9, 9, 9, 9, PicturesElsewhere())
             text = _readme(row, summary, OPTIONS, collection)
             assert "[[" not in text
             assert "]]" not in text

@@ -15,7 +15,7 @@ import minari
 
 from er_gym.data.collection import Collection
 from er_gym.data.exports import ExportError, ExportOptions, export
-from er_gym.envs.actions import ACTIONS, INDEX, understand
+from er_gym.envs.actions import ACTIONS, INDEX, parse_action
 from er_gym.envs.embodied_env import EmbodiedEnv
 
 
@@ -125,7 +125,7 @@ def test_minari_collects_in_the_environment_with_its_info(
     for last in ("end", "open Fridge"):  # Minari cuts the second
         told.append([env.reset(seed=3)[1]])
         for said in ("observe", "navigate to Fridge", last):
-            action, _ = understand(said)
+            action, _ = parse_action(said)
             told[-1].append(env.step(INDEX[action])[4])
     dataset = env.create_dataset("er-gym/collected-v0", algorithm_name="by hand")
     env.close()

@@ -16,7 +16,7 @@ from support import ROOT, in_one_test
 
 from er_gym.rollout.cluster import session
 from er_gym.rollout.cluster.greeting import problem_at
-from er_gym.rollout.cluster.session import RayUnavailable, ray_machines
+from er_gym.rollout.cluster.session import RayUnavailable, ray_backend
 from er_gym.rollout.cluster.settings import RaySettings
 
 SILENT = "PORT"
@@ -81,7 +81,7 @@ import sys
 from er_gym.rollout.cluster import session
 from er_gym.rollout.cluster.settings import RaySettings
 session._JOIN_SECONDS = 3.0
-with session.ray_machines(RaySettings(sys.argv[1]), print):
+with session.ray_backend(RaySettings(sys.argv[1]), print):
     pass
 """
 
@@ -102,7 +102,7 @@ def test_what_is_no_ray_is_refused_before_ray_is_imported(case, monkeypatch) -> 
     with (
         server(sends(b"")) as port,
         pytest.raises(RayUnavailable) as refused,
-        ray_machines(RaySettings(address.replace(SILENT, str(port))), print),
+        ray_backend(RaySettings(address.replace(SILENT, str(port))), print),
     ):
         pass
     assert told in str(refused.value)

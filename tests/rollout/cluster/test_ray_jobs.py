@@ -17,13 +17,13 @@ import pytest
 import ray_jobs
 from support import ROOT
 
-from er_gym.rollout.cluster.session import ray_machines
+from er_gym.rollout.cluster.session import ray_backend
 from er_gym.rollout.cluster.settings import RaySettings
 from er_gym.rollout.env_pool import EnvLost, EnvPool
 from er_gym.rollout.executor import Parallelism
-from er_gym.rollout.machines import THIS_MACHINE
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.rollout.runner import EXECUTORS, run
+from er_gym.rollout.worker_backend import LOCAL_BACKEND
 from er_gym.rollout.worker_pool import LostJob, WorkerSetupError
 from er_gym.tasks.paper_format import read_tasks
 
@@ -31,8 +31,8 @@ ray = pytest.importorskip("ray", reason="Ray is not installed")
 
 
 @pytest.fixture(scope="module")
-def machines():
-    with ray_machines(RaySettings(cpus=0.1, memory=2**28), print) as ours:
+def worker_backend():
+    with ray_backend(RaySettings(cpus=0.1, memory=2**28), print) as ours:
         yield ours
 
 
@@ -60,9 +60,9 @@ def until(check, seconds=20):
     return check()
 
 
-def test_every_job_is_done_once_and_those_that_kill_are_given_up(machines):
+def test_every_job_is_done_once_and_those_that_kill_are_given_up(worker_backend):
     jobs = [*range(40), "die", *range(40, 80), "raise"]
-    results = list(machines.run_jobs(ray_jobs.Troubled, jobs, workers=2))
+    results = list(worker_backend.run_jobs(ray_jobs.Troubled, jobs, workers=2))
     lost = {job: result for job, result in results if isinstance(result, LostJob)}
     assert lost.keys() == {"die", "raise"}
     assert (lost["raise"].tries, lost["raise"].why) == (3, "KeyError: 'no such thing'")
@@ -76,27 +76,29 @@ def test_every_job_is_done_once_and_those_that_kill_are_given_up(machines):
     assert all(result[0] == job for job, result in results if job not in lost)
 
 
-def test_a_worker_that_cannot_be_made_is_the_same_error_as_here(machines):
-    for where in (THIS_MACHINE, machines):
+def test_a_worker_that_cannot_be_made_is_the_same_error_as_here(worker_backend):
+    for where in (LOCAL_BACKEND, worker_backend):
         with pytest.raises(WorkerSetupError, match=r"^OSError: no such engine$"):
             list(where.run_jobs(ray_jobs.no_such_engine, [1, 2], workers=2))
 
 
-def test_a_worker_keeps_to_its_room(machines):
+def test_a_worker_keeps_to_its_room(worker_backend):
     jobs = [(room, number) for number in range(30) for room in "ab"]
-    results = machines.run_jobs(ray_jobs.Troubled, jobs, workers=2, room=lambda job: job[0])
+    results = worker_backend.run_jobs(
+        ray_jobs.Troubled, jobs, workers=2, affinity_key=lambda job: job[0]
+    )
     homes = {(pid, job[0]) for job, (_, pid) in results}
     assert len(homes) <= 3  # who has finished a room helps with the other
 
 
-def test_a_worker_that_has_grown_is_replaced(machines, capsys):
+def test_a_worker_that_has_grown_is_replaced(worker_backend, capsys):
     jobs = ["grow", *range(6)]
-    assert len(pids(machines.run_jobs(ray_jobs.Troubled, jobs, workers=1))) == 2
+    assert len(pids(worker_backend.run_jobs(ray_jobs.Troubled, jobs, workers=1))) == 2
     assert capsys.readouterr().out.count("give a larger --worker-memory") == 1
 
 
-def test_leaving_early_ends_the_workers(machines):
-    results = machines.run_jobs(ray_jobs.Troubled, [1, *["sleep"] * 5], workers=2)
+def test_leaving_early_ends_the_workers(worker_backend):
+    results = worker_backend.run_jobs(ray_jobs.Troubled, [1, *["sleep"] * 5], workers=2)
     _, (_, pid) = next(results)
     assert is_alive(pid)
     results.close()
@@ -105,23 +107,23 @@ def test_leaving_early_ends_the_workers(machines):
 
 @pytest.mark.parametrize("executor", sorted(EXECUTORS))
 def test_a_run_is_the_same_as_on_this_machine(
-    machines, executor, tmp_path, manifest, tasks_file, monkeypatch
+    worker_backend, executor, tmp_path, manifest, tasks_file, monkeypatch
 ):
     tasks = read_tasks(tasks_file)[:2]
     changed = manifest.model_copy(update={"env": {"obs_mode": "text", "max_steps": 4}})
     records = []
-    for name, where in (("here", THIS_MACHINE), ("ray", machines)):
+    for name, where in (("here", LOCAL_BACKEND), ("ray", worker_backend)):
         directory = RunDirectory.create(tmp_path / name, changed)
-        size = Parallelism(workers=2, concurrency=2, machines=where)
+        size = Parallelism(workers=2, concurrency=2, worker_backend=where)
         run(directory, tasks, by_hand.ending, executor=executor, parallelism=size)
         records.append([each.model_copy(update={"seconds": 0}) for each in directory.episodes()])
     assert records[0] == records[1]
     assert len(records[0]) == 2
 
 
-def test_an_environment_whose_worker_dies_is_made_anew(machines, tasks_file):
+def test_an_environment_whose_worker_dies_is_made_anew(worker_backend, tasks_file):
     task = read_tasks(tasks_file)[0]
-    with EnvPool(1, 2, {"obs_mode": "text"}, machines=machines) as pool:
+    with EnvPool(1, 2, {"obs_mode": "text"}, worker_backend=worker_backend) as pool:
         env, other = pool.env(0), pool.env(1)
         _, info = env.reset(seed=0, options={"task": task})
         with pytest.raises(gymnasium.error.InvalidAction, match="is not an action"):
@@ -139,16 +141,16 @@ def test_an_environment_whose_worker_dies_is_made_anew(machines, tasks_file):
         assert again["feedback"] == info["feedback"]
 
 
-def test_nothing_is_left_of_a_ray_that_was_started_here(machines):
+def test_nothing_is_left_of_a_ray_that_was_started_here(worker_backend):
     program = """
 import os, signal, sys, time
 import ray
 from benchmarks.cli.errors import interrupted_by_sigterm
-from er_gym.rollout.cluster.session import ray_machines
+from er_gym.rollout.cluster.session import ray_backend
 from er_gym.rollout.cluster.settings import RaySettings
-with interrupted_by_sigterm(), ray_machines(RaySettings(), print) as machines:
+with interrupted_by_sigterm(), ray_backend(RaySettings(), print) as worker_backend:
     print(ray._private.worker._global_node.get_temp_dir_path(), flush=True)
-    for _ in machines.run_jobs(lambda: time.sleep, [0.01] * 100, workers=1):
+    for _ in worker_backend.run_jobs(lambda: time.sleep, [0.01] * 100, workers=1):
         if sys.argv[1:]:
             os.killpg(0, signal.Signals[sys.argv[1]])
 """
@@ -171,7 +173,7 @@ def test_a_start_that_fails_half_way_leaves_no_process():
 import os
 from pathlib import Path
 from ray._private import services
-from er_gym.rollout.cluster.session import RayUnavailable, ray_machines
+from er_gym.rollout.cluster.session import RayUnavailable, ray_backend
 from er_gym.rollout.cluster.settings import RaySettings
 
 def servers():
@@ -185,7 +187,7 @@ def no_raylet(*args, **kwargs):
 
 services.start_raylet = no_raylet
 try:
-    with ray_machines(RaySettings(), print):
+    with ray_backend(RaySettings(), print):
         pass
 except RayUnavailable as error:
     print(servers(), error)
@@ -199,12 +201,12 @@ def test_a_run_whose_ray_dies_ends_with_a_word():
     program = """
 import sys, time
 import ray
-from er_gym.rollout.cluster.session import ray_machines
+from er_gym.rollout.cluster.session import ray_backend
 from er_gym.rollout.cluster.settings import RaySettings
-with ray_machines(RaySettings(), lambda line: print(line, file=sys.stderr, flush=True)) as machines:
+with ray_backend(RaySettings(), lambda line: print(line, file=sys.stderr, flush=True)) as backend:
     node = ray._private.worker._global_node
     print(node.all_processes["raylet"][0].process.pid, node.get_temp_dir_path(), flush=True)
-    for _ in machines.run_jobs(lambda: time.sleep, [0.01] * 10**6, workers=1):
+    for _ in backend.run_jobs(lambda: time.sleep, [0.01] * 10**6, workers=1):
         print("done", flush=True)
 """
     command = [sys.executable, "-c", program]
@@ -227,7 +229,7 @@ def _mentions(pid, folder):
         return False
 
 
-def test_all_servers_listen_on_loopback_alone(machines):
+def test_all_servers_listen_on_loopback_alone(worker_backend):
     family = _descendants(os.getpid())
     inodes = {inode for pid in family for inode in _sockets(pid)}
     listening = [

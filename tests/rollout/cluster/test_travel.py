@@ -9,7 +9,7 @@ import pytest
 
 from er_gym.rollout.cluster.modules import modules_of
 from er_gym.rollout.cluster.origin import Origin, missing_there
-from er_gym.rollout.cluster.session import RayUnavailable, ray_machines
+from er_gym.rollout.cluster.session import RayUnavailable, ray_backend
 from er_gym.rollout.cluster.settings import RaySettings
 
 
@@ -53,6 +53,6 @@ def test_impossible_workers_are_refused(given):
 def test_an_address_without_a_cluster_is_one_line(address):
     with (
         pytest.raises(RayUnavailable, match="give the address that `ray status` accepts"),
-        ray_machines(RaySettings(address), print),
+        ray_backend(RaySettings(address), print),
     ):
         pass

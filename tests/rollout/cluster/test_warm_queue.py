@@ -6,7 +6,7 @@ from er_gym.rollout.cluster.warm_queue import WarmQueue
 
 
 def queue(jobs):
-    return WarmQueue(jobs, room=lambda job: job[0])
+    return WarmQueue(jobs, affinity_key=lambda job: job[0])
 
 
 def test_a_worker_gets_jobs_of_its_room_in_their_order():

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 
-from er_gym.plugins import PluginError, added
+from er_gym.plugins import PluginError, added_objects
 from er_gym.sim.render.appearance import Appearance
 from er_gym.sim.render.mesh import Mesh
 from er_gym.sim.render.patch import Patch
@@ -46,7 +46,7 @@ def load_added() -> None:
         PluginError: a shape cannot be loaded, or is not a registered function.
     """
     expected = f"a function under @{__name__}.shape"
-    for found, origin in added("shape", "shapes", expected, registers=True):
+    for found, origin in added_objects("shape", "shapes", expected, registers=True):
         if not any(each is found for each in SHAPES.values()):
             raise PluginError(f"{origin} is {found!r}; give {expected}")
 

@@ -14,7 +14,7 @@ import pytest
 from agents.expert.writers.base import ThoughtRequest
 from agents.expert.writers.facts import facts_of, outcome_of
 from agents.expert.writers.grammar import Rule, Writing, grammar, parse
-from agents.expert.writers.grounded import GroundedWriter, sentences, words
+from agents.expert.writers.grounded import GroundedWriter, length_in_words, sentences
 from agents.expert.writers.nouns import names, nouns
 from agents.expert.writers.registry import WRITERS
 from benchmarks.checks.thought_variety import played, written
@@ -153,7 +153,7 @@ def test_keeps_to_the_limit(language: Language, limit: int) -> None:
     for seed, knowledge in enumerate(knowledges(language)):
         written = WRITER.write(request_of(knowledge, "planning", limit=limit, seed=seed))
         text = written.thoughts[0].text
-        assert words(text, language) <= limit or len(sentences(text, language)) == 1
+        assert length_in_words(text, language) <= limit or len(sentences(text, language)) == 1
 
 
 def test_says_nothing_twice_in_an_episode() -> None:

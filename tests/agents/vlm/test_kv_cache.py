@@ -19,7 +19,7 @@ import torch
 from tiny_qwen import make_tiny_qwen
 
 from agents.vlm.chat import LEFT_OUT, Message, Picture, Reply
-from agents.vlm.clients.kept_turns import KeptConversations, KeptTurns, conversation_name
+from agents.vlm.clients.kv_cache import CachedTurns, ConversationCache, conversation_name
 from agents.vlm.clients.local import LocalClient
 from agents.vlm.pictures import encode
 from agents.vlm.settings import AgentSettings, Pictures
@@ -218,10 +218,10 @@ def test_pictures_are_processed_once(
 
 
 def test_the_oldest_make_room() -> None:
-    def turns(tokens: int) -> KeptTurns:
-        return KeptTurns(range(tokens), (), None, [(torch.zeros(1, tokens, 4),) * 2])
+    def turns(tokens: int) -> CachedTurns:
+        return CachedTurns(range(tokens), (), None, [(torch.zeros(1, tokens, 4),) * 2])
 
-    kept = KeptConversations(limit=turns(10).size)
+    kept = ConversationCache(limit=turns(10).size)
     for name in "abc":
         kept.keep(name, turns(4))
     assert [kept.take(name) is not None for name in "abc"] == [False, True, True]

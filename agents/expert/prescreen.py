@@ -1,8 +1,8 @@
-"""Auditions: candidates are played without pictures and thoughts, to see which will be taken.
+"""Prescreening: candidates are played without pictures and thoughts, to see which will be taken.
 
 Two thirds of the candidates are not taken: their object was in view from the beginning, nothing
-went wrong, the explorer did not find it. An audition costs a tenth of an episode with pictures. An
-episode comes out the same as its audition, since both have the same seed.
+went wrong, the explorer did not find it. A prescreening costs a tenth of an episode with pictures.
+An episode comes out the same as its prescreening, since both have the same seed.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from typing import Any
 
 from agents.expert.acceptance import PlayedCourse, rejection
 from agents.expert.candidates import Candidate
-from agents.expert.corrections import beginning_of
+from agents.expert.corrections import first_mistake
 from agents.expert.course import Course, Intent, View
 from agents.expert.thought_kinds import ThoughtKinds
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.agent import Decision
-from er_gym.rollout.machines import THIS_MACHINE, Machines
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.records import EpisodeRecord
+from er_gym.rollout.worker_backend import LOCAL_BACKEND, WorkerBackend
 from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.task import Task
 
@@ -34,8 +34,8 @@ _MOST_AT_ONCE = 60
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """The result of an audition.
+class PrescreenResult:
+    """The result of a prescreening.
 
     Attributes:
         candidate: the candidate; a correction has the beginning that it corrects now.
@@ -46,7 +46,7 @@ class Verdict:
     reason: str = ""
 
 
-def audition(
+def prescreen(
     candidates: Sequence[Candidate],
     *,
     env: Mapping[str, Any],
@@ -54,9 +54,9 @@ def audition(
     kinds: ThoughtKinds,
     most_actions: int,
     workers: int,
-    machines: Machines = THIS_MACHINE,
-) -> Iterator[Verdict]:
-    """Play candidates without thoughts in worker processes; yields each verdict when it is known.
+    worker_backend: WorkerBackend = LOCAL_BACKEND,
+) -> Iterator[PrescreenResult]:
+    """Play candidates without thoughts in worker processes; yields each result when it is known.
 
     Args:
         candidates: of one part.
@@ -65,17 +65,19 @@ def audition(
         kinds: draws how tasks end.
         most_actions: longer trajectories are not taken.
         workers: the number of processes.
-        machines: where they run.
+        worker_backend: where they run.
 
     Raises:
         WorkerSetupError: the environment cannot be made.
     """
-    make = partial(_Auditions, dict(env), seed, kinds, most_actions)
+    make = partial(_Prescreener, dict(env), seed, kinds, most_actions)
     jobs = [*_jobs(candidates)]
-    with closing(machines.run_jobs(make, jobs, workers=workers, room=_room)) as results:
+    with closing(
+        worker_backend.run_jobs(make, jobs, workers=workers, affinity_key=_room)
+    ) as results:
         for job, result in results:
             if isinstance(result, LostJob):
-                yield from (Verdict(each, "its audition crashed") for each in job)
+                yield from (PrescreenResult(each, "its prescreening crashed") for each in job)
             else:
                 yield from result
 
@@ -113,7 +115,7 @@ class SilentAgent:
         return Decision(next(self._intents).action)
 
 
-class _Auditions:
+class _Prescreener:
     """Plays the candidates of a job in one environment."""
 
     def __init__(
@@ -122,20 +124,20 @@ class _Auditions:
         self._env = EmbodiedEnv((), **{**env, "obs_mode": SilentAgent.obs_mode})
         self._seed, self._kinds, self._most = seed, kinds, most_actions
 
-    def __call__(self, job: Sequence[Candidate]) -> list[Verdict]:
-        return [self._verdict(each) for each in job]
+    def __call__(self, job: Sequence[Candidate]) -> list[PrescreenResult]:
+        return [self._result(each) for each in job]
 
-    def _verdict(self, candidate: Candidate) -> Verdict:
+    def _result(self, candidate: Candidate) -> PrescreenResult:
         if candidate.actor == "corrector" and candidate.beginning is None:
-            beginning = beginning_of(self._play(candidate))
+            beginning = first_mistake(self._play(candidate))
             if beginning.problem:
-                return Verdict(candidate, f"attempt: {beginning.problem}")
+                return PrescreenResult(candidate, f"attempt: {beginning.problem}")
             candidate = replace(
                 candidate, beginning=beginning, run=ATTEMPT, episode=candidate.id, strength=None
             )
         episode = self._play(candidate)
         course = PlayedCourse.of_episode(episode, candidate.kind, candidate.mode)
-        return Verdict(candidate, rejection(course, self._most))
+        return PrescreenResult(candidate, rejection(course, self._most))
 
     def _play(self, candidate: Candidate) -> EpisodeRecord:
         seed = episode_seed(self._seed, candidate.id)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import shlex
 
-from agents.finetune.printing.expected import models_table, run_table
-from agents.finetune.printing.plan import DATA, Printed, PrintPlan
+from agents.finetune.launchers.expected import models_table, run_table
+from agents.finetune.launchers.plan import DATA, LauncherFiles, LaunchPlan
 from er_gym.writing import MARKDOWN_MARK
 
 SCRIPT = "train.sh"
@@ -13,18 +13,18 @@ _WHOLE_EMBEDDINGS = ("llama-factory", "ms-swift")
 """Programs that, with LoRA, train the embeddings as a whole if a token is new."""
 
 
-def script(printed: Printed) -> str:
+def script(files: LauncherFiles) -> str:
     """The launch script: it runs the command in its own folder."""
     lines = ["#!/usr/bin/env bash", "set -euo pipefail", 'cd "$(dirname "$0")"']
     lines += [
         f"export {name}=${{{name}:-{shlex.quote(value)}}}"
-        for name, value in printed.environment.items()
+        for name, value in files.environment.items()
     ]
-    lines.append(f'exec {shlex.join(printed.command)} "$@"')
+    lines.append(f'exec {shlex.join(files.command)} "$@"')
     return "\n".join(lines) + "\n"
 
 
-def readme(plan: PrintPlan, printed: Printed, program: str) -> str:
+def readme(plan: LaunchPlan, files: LauncherFiles, program: str) -> str:
     """What is in the folder, how to start it, and how much memory it is expected to take."""
     settings, facts = plan.settings, plan.facts
     how = "full fine-tuning" if settings.model.lora is None else "LoRA"
@@ -34,13 +34,13 @@ def readme(plan: PrintPlan, printed: Printed, program: str) -> str:
     lines = [
         f"{MARKDOWN_MARK}# {plan.name}: {plan.model.weights}, {how}, with {program}",
         "",
-        f"Written by er-gym for {printed.made_with}. Copy this folder to the cluster and run "
+        f"Written by er-gym for {files.made_with}. Copy this folder to the cluster and run "
         f"`bash {SCRIPT}` there.",
         "",
         f"- `{DATA}/`: {facts.chats:,} conversations, {facts.pictures:,} pictures{left_out}",
-        *(f"- `{name}`" for name in (*printed.texts, SCRIPT)),
+        *(f"- `{name}`" for name in (*files.texts, SCRIPT)),
         "",
-        *(line for note in printed.notes for line in (note, "")),
+        *(line for note in files.notes for line in (note, "")),
         "## Memory",
         "",
         f"Estimated, not measured: {how} on {plan.gpus} GPU{'s' * (plan.gpus > 1)}"

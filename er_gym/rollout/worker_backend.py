@@ -1,7 +1,8 @@
 """Where worker processes run: on this machine, or on a cluster.
 
-Everything that needs worker processes asks a :class:`Machines` for them. :data:`THIS_MACHINE` has
-processes of its own; :class:`er_gym.rollout.cluster.machines.RayMachines` has Ray's.
+Everything that needs worker processes asks a :class:`WorkerBackend` for them.
+:data:`LOCAL_BACKEND` has processes of its own;
+:class:`er_gym.rollout.cluster.worker_backend.RayBackend` has Ray's.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 
-class Machines(Protocol):
+class WorkerBackend(Protocol):
     """Where worker processes run; hashable and cheap to hold."""
 
     @property
-    def is_here(self) -> bool:
+    def is_local(self) -> bool:
         """Whether all workers are on this machine, so that they may append to a file at once."""
 
     @property
@@ -35,7 +36,7 @@ class Machines(Protocol):
         *,
         workers: int,
         tries: int = 3,
-        room: Callable[[Job], Hashable] | None = None,
+        affinity_key: Callable[[Job], Hashable] | None = None,
     ) -> Generator[tuple[Job, Result | LostJob], None, None]:
         """Do every job in a worker process; see :func:`.worker_pool.run_jobs`.
 
@@ -44,8 +45,8 @@ class Machines(Protocol):
             jobs: as there.
             workers: as there.
             tries: as there.
-            room: the room that a worker has loaded once it has done a job; jobs of one room go to
-                one worker where that costs no time.
+            affinity_key: of a job, such as its room: jobs with the same key go to one worker where
+                that costs no time.
         """
 
     def start_env_worker(self, slots: Sequence[int], env: Mapping[str, Any]) -> EnvWorker:
@@ -54,10 +55,10 @@ class Machines(Protocol):
 
 
 @dataclass(frozen=True)
-class _ThisMachine:
-    """Spawned processes of this machine; see :class:`Machines`."""
+class _LocalBackend:
+    """Spawned processes of this machine; see :class:`WorkerBackend`."""
 
-    is_here = True
+    is_local = True
     shares_files = True
 
     def run_jobs(
@@ -67,13 +68,13 @@ class _ThisMachine:
         *,
         workers: int,
         tries: int = 3,
-        room: Callable[[Job], Hashable] | None = None,
+        affinity_key: Callable[[Job], Hashable] | None = None,
     ) -> Generator[tuple[Job, Result | LostJob], None, None]:
-        """All rooms fit into the memory of each process, so ``room`` changes nothing."""
+        """All rooms fit into the memory of each process, so ``affinity_key`` changes nothing."""
         return run_jobs(make, jobs, workers=workers, tries=tries)
 
     def start_env_worker(self, slots: Sequence[int], env: Mapping[str, Any]) -> EnvWorker:
         return LocalEnvWorker(slots, env)
 
 
-THIS_MACHINE: Machines = _ThisMachine()
+LOCAL_BACKEND: WorkerBackend = _LocalBackend()

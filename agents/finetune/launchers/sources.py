@@ -43,7 +43,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Facts:
+class DataFacts:
     """What is in the conversations.
 
     Attributes:
@@ -99,7 +99,7 @@ def open_source(path: Path, settings: DataSettings) -> Source:
     )
 
 
-def look_at(source: Source, count: PicturesToTokens) -> Facts:
+def data_facts(source: Source, count: PicturesToTokens) -> DataFacts:
     """Go through the conversations once.
 
     Raises:
@@ -125,7 +125,9 @@ def look_at(source: Source, count: PicturesToTokens) -> Facts:
             f"{source.path}: none of its {left_out:,} conversations has a turn to learn; choose "
             "other data or other data.parts"
         )
-    return Facts(chats, left_out, partly, feedback, pictures, longest, most, most_pictures, shown)
+    return DataFacts(
+        chats, left_out, partly, feedback, pictures, longest, most, most_pictures, shown
+    )
 
 
 @dataclass

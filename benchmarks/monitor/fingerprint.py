@@ -1,5 +1,7 @@
-"""Whether a directory is in use, and what changes when it grows: from its files' names and sizes
-alone, so that it can be asked often."""
+"""Whether a directory is in use, and a fingerprint that changes whenever it does.
+
+Both come from its files' names, times and sizes alone, so that they can be asked often.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ import socket
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from benchmarks.monitor.places import Kind, Place
+from benchmarks.monitor.directories import Directory, Kind
 from er_gym.locking import LOCK
 
 _GROWING: Mapping[Kind, Sequence[str]] = {
@@ -18,16 +20,16 @@ _GROWING: Mapping[Kind, Sequence[str]] = {
     "ablation": ("ablation.json", "result.json", LOCK),
     "collection": ("collection.json", "trajectories.jsonl", "parts", LOCK),
 }
-"""The files whose growth is a directory's."""
+"""The files by whose times and sizes a directory is seen to change."""
 _MOST_PARTS = 50
 
 
-def growth(place: Place) -> object:
+def fingerprint(directory: Directory) -> object:
     """What changes whenever a directory does that is no run."""
-    names = list(_GROWING.get(place.kind, ()))
-    if place.kind == "collection":
-        names += [f"parts/{part}/events.jsonl" for part in parts_of(place.path)]
-    return tuple(_state(place.path / name) for name in names)
+    names = list(_GROWING.get(directory.kind, ()))
+    if directory.kind == "collection":
+        names += [f"parts/{part}/events.jsonl" for part in parts_of(directory.path)]
+    return tuple(_state(directory.path / name) for name in names)
 
 
 def parts_of(collection: Path) -> list[str]:
@@ -40,9 +42,9 @@ def parts_of(collection: Path) -> list[str]:
     return sorted(found)[:_MOST_PARTS]
 
 
-def changed(place: Place) -> float:
+def changed(directory: Directory) -> float:
     """When it changed last, seconds since the epoch; 0 if unknown."""
-    told = [_state(place.path / name) for name in _GROWING.get(place.kind, ())]
+    told = [_state(directory.path / name) for name in _GROWING.get(directory.kind, ())]
     return max((each[0] for each in told if each), default=0) / 1e9
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from er_gym.data.mentions import Mention, all_alike
+from er_gym.data.mentions import Mention, all_interchangeable
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.tasks import verbs
@@ -30,7 +30,7 @@ _RECENT = 3
 # -- what was done ---------------------------------------------------------------------------------
 
 
-def history(thought: Thought) -> Iterator[Refusal]:
+def check_history(thought: Thought) -> Iterator[Refusal]:
     """Claims to have done an action that was not done."""
     for clause in thought.clauses:
         if clause.asks or clause.conditional or clause.hedged or not clause.mentions:
@@ -52,7 +52,7 @@ def history(thought: Thought) -> Iterator[Refusal]:
 
 
 def _has_done(thought: Thought, verb: str, mention: Mention) -> bool:
-    known, types = thought.known, all_alike(mention.types)
+    known, types = thought.known, all_interchangeable(mention.types)
     if verb == verbs.PICKUP and types & thought.held:
         return True
     if verb == verbs.NAVIGATE and known.at in types:
@@ -71,7 +71,7 @@ def _has_done(thought: Thought, verb: str, mention: Mention) -> bool:
     return not opens and any(place for each in types for place in (known.seen.get(each),))
 
 
-def outcome(thought: Thought) -> Iterator[Refusal]:
+def check_outcome(thought: Thought) -> Iterator[Refusal]:
     """Claims that the last action succeeded when it failed, or the other way round."""
     actions = thought.known.actions
     last = thought.known.last
@@ -122,7 +122,7 @@ class Decided:
     later: bool
 
 
-def decision(thought: Thought) -> Iterator[Refusal]:
+def check_decision(thought: Thought) -> Iterator[Refusal]:
     """Announces another action than the one that the turn takes."""
     known, phrases = thought.known, thought.phrases
     decided = [each for each in _decided(thought) if each.act != "look around" or each.clause.last]
@@ -201,7 +201,7 @@ def _fits(thought: Thought, decided: Decided) -> bool:
     """Whether an action that a thought decides on is the one that is taken, or begins with it."""
     known = thought.known
     verb, target = known.decision.verb, known.decision.object_type
-    things = all_alike(decided.thing.types) if decided.thing else frozenset()
+    things = all_interchangeable(decided.thing.types) if decided.thing else frozenset()
     same = not decided.thing or target in things
     act = decided.act
     if verb == verbs.OBSERVE:
@@ -240,5 +240,5 @@ def _takes(thought: Thought, things: frozenset[str], verb: str, target: str) -> 
     }
     return verb in (verbs.NAVIGATE, verbs.OPEN) and (
         target in things
-        or bool(all_alike(each for each in holders if each in OBJECT_TYPES) & {target})
+        or bool(all_interchangeable(each for each in holders if each in OBJECT_TYPES) & {target})
     )

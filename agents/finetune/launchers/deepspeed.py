@@ -9,16 +9,16 @@ from itertools import chain
 from pathlib import Path
 
 from agents import configs
-from agents.finetune.printing.plan import (
+from agents.finetune.launchers.plan import (
     DATA,
     OUTPUT,
     ZERO3_FILE,
-    Printed,
-    PrintPlan,
+    LauncherFiles,
+    LaunchPlan,
     Program,
     zero3,
 )
-from agents.finetune.printing.sources import SourceJob
+from agents.finetune.launchers.sources import SourceJob
 from er_gym.data.collection import MANIFEST
 from er_gym.data.exports.ms_swift import MS_SWIFT as EXPORT
 from er_gym.writing import place_file
@@ -29,7 +29,7 @@ _LAUNCH = ("torchrun", "--nproc_per_node")
 _MODULE = ("-m", "benchmarks.cli", "finetune")
 
 
-def _write(plan: PrintPlan, folder: Path) -> Printed:
+def _write(plan: LaunchPlan, folder: Path) -> LauncherFiles:
     whole = (plan.source.path / MANIFEST).is_file()
     if whole:
         shutil.copytree(
@@ -54,7 +54,7 @@ def _write(plan: PrintPlan, folder: Path) -> Printed:
             f"It loads a model from a directory: `hf download {plan.model.weights} --local-dir "
             f"{_MODEL}` first."
         )
-    return Printed(
+    return LauncherFiles(
         texts={
             _SETTINGS: configs.dump(settings),
             ZERO3_FILE: json.dumps(zero3(plan), indent=2) + "\n",

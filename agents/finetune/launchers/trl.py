@@ -5,17 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from agents.finetune.printing.plan import (
+from agents.finetune.launchers.plan import (
     DATA,
-    Printed,
-    PrintPlan,
+    LauncherFiles,
+    LaunchPlan,
     Program,
     of_lora,
     of_transformers,
     yaml_text,
     zero3_text,
 )
-from agents.finetune.printing.sources import SourceJob
+from agents.finetune.launchers.sources import SourceJob
 from er_gym.data.exports.sharegpt import FEEDBACK_TOKEN
 from er_gym.data.exports.trl import TRL as EXPORT
 
@@ -25,7 +25,7 @@ _LAUNCH = ("accelerate", "launch", "--num_processes")
 _SOURCE = Path(__file__).with_name("trl_script.py")
 
 
-def arguments(plan: PrintPlan) -> dict[str, Any]:
+def arguments(plan: LaunchPlan) -> dict[str, Any]:
     """The arguments of a run: the script's own, ``SFTConfig``'s and ``ModelConfig``'s."""
     model, data, training = plan.settings.model, plan.settings.data, plan.settings.training
     found: dict[str, Any] = {
@@ -55,14 +55,14 @@ def arguments(plan: PrintPlan) -> dict[str, Any]:
     return found
 
 
-def _write(plan: PrintPlan, folder: Path) -> Printed:
+def _write(plan: LaunchPlan, folder: Path) -> LauncherFiles:
     EXPORT.write(SourceJob.of(plan.source, folder / DATA, per_turn=False, copy=plan.copy))
     texts = {
         _CONFIG: yaml_text(arguments(plan)),
         _SCRIPT: _SOURCE.read_text(encoding="utf-8"),
         **zero3_text(plan),
     }
-    return Printed(
+    return LauncherFiles(
         texts=texts,
         command=(*_LAUNCH, str(plan.gpus), _SCRIPT, "--config", _CONFIG),
         environment={},

@@ -41,7 +41,7 @@ Layers = list[tuple[torch.Tensor, torch.Tensor]]
 
 
 @dataclass(frozen=True)
-class KeptTurns:
+class CachedTurns:
     """The turns of a conversation that a model has processed.
 
     Attributes:
@@ -101,7 +101,7 @@ class KeptTurns:
         ]
 
 
-class KeptConversations:
+class ConversationCache:
     """The cached turns of the most recently used conversations; thread-safe.
 
     Args:
@@ -111,14 +111,14 @@ class KeptConversations:
     def __init__(self, limit: int) -> None:
         self._limit = limit
         self._lock = threading.Lock()
-        self._kept: OrderedDict[str, KeptTurns] = OrderedDict()
+        self._kept: OrderedDict[str, CachedTurns] = OrderedDict()
 
-    def take(self, name: str) -> KeptTurns | None:
+    def take(self, name: str) -> CachedTurns | None:
         """Take the turns of a conversation out; None if they are not here."""
         with self._lock:
             return self._kept.pop(name, None)
 
-    def keep(self, name: str, turns: KeptTurns) -> None:
+    def keep(self, name: str, turns: CachedTurns) -> None:
         """Keep the turns of a conversation; the least recently used conversations are dropped."""
         with self._lock:
             self._kept.pop(name, None)

@@ -14,7 +14,7 @@ _LONGEST_ENDING = 6
 
 
 @dataclass(frozen=True)
-class Outside:
+class PicturesElsewhere:
     """Counts the pictures that lie outside the folder in which they are expected.
 
     Attributes:
@@ -30,7 +30,7 @@ class Outside:
         return f"{self.count:,} pictures lie outside {self.folder}, such as {self.first}"
 
 
-class Album:
+class PictureFolder:
     """The pictures of an output.
 
     Attributes:
@@ -42,7 +42,7 @@ class Album:
     def __init__(self, folder: Path, *, copy: bool) -> None:
         self.folder = folder
         self.pictures = self.linked = 0
-        self.outside = Outside()
+        self.outside = PicturesElsewhere()
         self._copy = copy
 
     def place(self, source: Path, to: str | PurePosixPath, within: Path) -> None:
@@ -72,7 +72,7 @@ class Album:
             one = self.outside
             self.outside = replace(one, count=one.count + 1)
             if not one.count:
-                self.outside = Outside(1, str(within), real)
+                self.outside = PicturesElsewhere(1, str(within), real)
 
 
 def picture_name(stem: str, picture: PictureRecord) -> str:

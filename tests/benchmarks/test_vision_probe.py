@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from benchmarks.cli.main import cli
-from benchmarks.eyes import examine as eyes
-from benchmarks.eyes.__main__ import main
+from benchmarks.vision_probe import examine as probe
+from benchmarks.vision_probe.__main__ import main
 from er_gym.data.dialects import load_dialect
 from er_gym.data.frame_chat import QUESTIONS, Question, words_for_frames
 
@@ -19,7 +19,7 @@ LAPTOP = Question("Laptop", "where Laptop", "Desk ( Laptop far open off ); left"
 
 def test_the_types_that_a_scene_names() -> None:
     text = "<Observation>see CounterTop ( Mug far ), Fridge closed, Flibber\nhold Egg</Observation>"
-    assert eyes.types_in(text) == {"CounterTop", "Mug", "Fridge", "Egg"}
+    assert probe.types_in(text) == {"CounterTop", "Mug", "Fridge", "Egg"}
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def test_the_types_that_a_scene_names() -> None:
     ],
 )
 def test_answers_are_judged_part_by_part(said: str, right: set[str]) -> None:
-    found = eyes.verdicts(LAPTOP, said, *WORDS)
+    found = probe.verdicts(LAPTOP, said, *WORDS)
     assert {name for name, is_right in found.items() if is_right} == right
     assert found.keys() == ({"present"} if "unseen" in said else
                             {"present", "side", "reach", "open", "on", "support"})  # fmt: skip
@@ -40,16 +40,16 @@ def test_answers_are_judged_part_by_part(said: str, right: set[str]) -> None:
 
 def test_precision_recall_and_interval() -> None:
     answers = [
-        eyes.Answers(frozenset("AB"), frozenset("ABCD")),
-        eyes.Answers(frozenset("AX"), frozenset("ABCDEF")),
+        probe.Answers(frozenset("AB"), frozenset("ABCD")),
+        probe.Answers(frozenset("AX"), frozenset("ABCDEF")),
     ]
-    precision, recall, f1 = eyes.precision_recall_f1(answers)
+    precision, recall, f1 = probe.precision_recall_f1(answers)
     assert (precision, recall) == (75.0, 30.0)
     assert f1 == pytest.approx(2 * 75 * 30 / 105)
-    moved = eyes.misplaced(answers)
+    moved = probe.misplaced(answers)
     assert [each.there for each in moved] == [answers[1].there, answers[0].there]
     assert [each.named for each in moved] == [each.named for each in answers]
-    low, high = eyes.f1_interval(answers)
+    low, high = probe.f1_interval(answers)
     assert low < f1 < high
 
 

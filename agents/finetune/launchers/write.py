@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from agents.finetune.launchers.deepspeed import DEEPSPEED
+from agents.finetune.launchers.llama_factory import LLAMA_FACTORY
+from agents.finetune.launchers.ms_swift import MS_SWIFT
+from agents.finetune.launchers.plan import DATA, LaunchPlan, Program
+from agents.finetune.launchers.readme import SCRIPT, readme, script
+from agents.finetune.launchers.sources import DataFacts, PicturesToTokens, data_facts, open_source
+from agents.finetune.launchers.trl import TRL
 from agents.finetune.models import ChosenModel, choose_model, picture_tokens
-from agents.finetune.printing.deepspeed import DEEPSPEED
-from agents.finetune.printing.llama_factory import LLAMA_FACTORY
-from agents.finetune.printing.ms_swift import MS_SWIFT
-from agents.finetune.printing.plan import DATA, PrintPlan, Program
-from agents.finetune.printing.readme import SCRIPT, readme, script
-from agents.finetune.printing.sources import Facts, PicturesToTokens, look_at, open_source
-from agents.finetune.printing.trl import TRL
 from agents.finetune.settings import FinetuneSettings
 from er_gym.data.trajectory import PictureRecord
 from er_gym.writing import check_folder, whole_folder, write_atomic
@@ -19,7 +19,7 @@ from er_gym.writing import check_folder, whole_folder, write_atomic
 PROGRAMS: dict[str, Program] = {row.name: row for row in (LLAMA_FACTORY, MS_SWIFT, TRL, DEEPSPEED)}
 """All programs by name."""
 FULL_GPUS, LORA_GPUS = 8, 1
-"""On how many GPUs a run is printed, if nothing is said."""
+"""On how many GPUs a run trains, if nothing is said."""
 
 
 def write_files(
@@ -64,15 +64,15 @@ def write_files(
     check_folder(out)
     count = gpus or (LORA_GPUS if settings.model.lora else FULL_GPUS)
     source = open_source(data, settings.data)
-    facts = look_at(source, _counter(chosen, settings))
+    facts = data_facts(source, _counter(chosen, settings))
     _check_length(facts, settings)
-    plan = PrintPlan(settings, chosen, source, facts, count, copy)
+    plan = LaunchPlan(settings, chosen, source, facts, count, copy)
     with whole_folder(out) as draft:
-        printed = PROGRAMS[program].write(plan, draft)
-        for name, text in printed.texts.items():
+        files = PROGRAMS[program].write(plan, draft)
+        for name, text in files.texts.items():
             write_atomic(draft / name, text)
-        write_atomic(draft / SCRIPT, script(printed), mode=0o755)
-        write_atomic(draft / "README.md", readme(plan, printed, program))
+        write_atomic(draft / SCRIPT, script(files), mode=0o755)
+        write_atomic(draft / "README.md", readme(plan, files, program))
     beside = [path for path in out.iterdir() if path.is_file()]
     return sorted([*beside, *(path for path in (out / DATA).iterdir() if path.is_file())])
 
@@ -87,7 +87,7 @@ def _counter(model: ChosenModel, settings: FinetuneSettings) -> PicturesToTokens
     return count
 
 
-def _check_length(facts: Facts, settings: FinetuneSettings) -> None:
+def _check_length(facts: DataFacts, settings: FinetuneSettings) -> None:
     limit = settings.data.max_length
     if facts.tokens > limit:
         raise ValueError(

@@ -33,7 +33,7 @@ _FRESH_SECONDS = 2.0
 
 
 @dataclass(frozen=True)
-class Place:
+class Directory:
     """A directory that can be shown.
 
     Attributes:
@@ -49,7 +49,7 @@ class Place:
     name: str
 
 
-class Places:
+class Directories:
     """Finds directories under the given ones, again when asked after a while.
 
     Args:
@@ -59,38 +59,38 @@ class Places:
     def __init__(self, roots: Sequence[Path]) -> None:
         self.roots = tuple(dict.fromkeys(root.resolve() for root in roots))
         self._lock = threading.Lock()
-        self._found: dict[str, Place] = {}
+        self._found: dict[str, Directory] = {}
         self._time = float("-inf")
 
-    def all(self) -> tuple[Place, ...]:
+    def all(self) -> tuple[Directory, ...]:
         """All directories that can be shown, in the order of their names."""
         with self._lock:
             if time.monotonic() - self._time > _FRESH_SECONDS:
-                self._found = {place.id: place for place in _find(self.roots)}
+                self._found = {directory.id: directory for directory in _find(self.roots)}
                 self._time = time.monotonic()
             return tuple(self._found.values())
 
-    def of_kind(self, kind: Kind) -> tuple[Place, ...]:
+    def of_kind(self, kind: Kind) -> tuple[Directory, ...]:
         """Those of one kind."""
-        return tuple(place for place in self.all() if place.kind == kind)
+        return tuple(directory for directory in self.all() if directory.kind == kind)
 
-    def at(self, path: Path, kind: Kind) -> Place | None:
+    def at(self, path: Path, kind: Kind) -> Directory | None:
         """The directory at a path, which may have been made this moment; None if there is none."""
         for _ in range(2):
-            for place in self.of_kind(kind):
-                if place.path == path:
-                    return place
+            for directory in self.of_kind(kind):
+                if directory.path == path:
+                    return directory
             with self._lock:
                 self._time = float("-inf")  # look again
         return None
 
-    def get(self, id: str) -> Place | None:
+    def get(self, id: str) -> Directory | None:
         """The directory with this id; None if there is none (any more)."""
         self.all()
         return self._found.get(id)
 
 
-def _find(roots: Sequence[Path]) -> Iterator[Place]:
+def _find(roots: Sequence[Path]) -> Iterator[Directory]:
     left = _MOST
     seen: set[Path] = set()
     for root in roots:
@@ -104,7 +104,7 @@ def _find(roots: Sequence[Path]) -> Iterator[Place]:
             names, inner = _listed(folder)
             for marker, kind in MARKERS.items():
                 if marker in names:
-                    yield _place(folder, root, kind)
+                    yield _directory(folder, root, kind)
             if depth < _DEEPEST:
                 waiting += [
                     (folder / name, depth + 1)
@@ -128,10 +128,10 @@ def _listed(folder: Path) -> tuple[set[str], list[str]]:
     return files, folders
 
 
-def _place(folder: Path, root: Path, kind: Kind) -> Place:
+def _directory(folder: Path, root: Path, kind: Kind) -> Directory:
     name = str(folder.relative_to(root.parent)) if folder != root else root.name
     told = f"{kind}:{folder}".encode(errors="surrogateescape")
-    return Place(hashlib.sha256(told).hexdigest()[:12], kind, folder, printable(name))
+    return Directory(hashlib.sha256(told).hexdigest()[:12], kind, folder, printable(name))
 
 
 def printable(text: str) -> str:

@@ -1,7 +1,7 @@
-"""The places in the client's folder that ``er-gym player install`` fills.
+"""The files in the client's folder that ``er-gym player install`` fills.
 
-A place is empty, or it holds a file or folder of er-gym or of another program. One rename moves a
-foreign file aside and one rename restores it, so that a kill in between loses nothing.
+Under each name stands nothing, or a file or folder of er-gym or of another program. One rename
+moves a foreign file aside and one rename restores it, so that a kill in between loses nothing.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def client_home() -> Path:
     return Path("~/.ai2thor").expanduser()
 
 
-class Place(ABC):
-    """One file or folder."""
+class ClientFile(ABC):
+    """A file or folder in the client's folder, under a name that the client looks up."""
 
     @property
     @abstractmethod
@@ -47,7 +47,7 @@ class Place(ABC):
     @property
     @abstractmethod
     def is_ours(self) -> bool:
-        """Whether the place holds er-gym's file."""
+        """Whether er-gym's file is there."""
 
     @abstractmethod
     def write(self, path: Path) -> None:
@@ -55,7 +55,7 @@ class Place(ABC):
 
     @property
     def is_foreign(self) -> bool:
-        """Whether the place holds a file that is not er-gym's."""
+        """Whether a file is there that is not er-gym's."""
         return os.path.lexists(self.path) and not self.is_ours
 
     @property
@@ -64,7 +64,7 @@ class Place(ABC):
         return client_home() / "set-aside-by-er-gym" / self.path.name
 
     def put(self) -> None:
-        """Fill the place, and move a foreign file aside."""
+        """Put er-gym's file there, and move a foreign file aside."""
         with _drafts() as drafts:
             self.write(drafts / "new")
             if self.is_foreign:
@@ -92,7 +92,7 @@ class Place(ABC):
 
 @contextlib.contextmanager
 def _drafts() -> Iterator[Path]:
-    """An empty folder on the same disk as the places, removed afterwards."""
+    """An empty folder on the same disk as the files, removed afterwards."""
     sweep()
     folder = _drafts_folder()
     folder.mkdir(parents=True)
@@ -115,8 +115,8 @@ def _drafts_folder() -> Path:
 
 
 @dataclass(frozen=True)
-class Release(Place):
-    """The place of a build of this client's version for one of its platforms."""
+class Release(ClientFile):
+    """A build of this client's version for one of its platforms."""
 
     platform: str = "CloudRendering"
 
@@ -142,7 +142,7 @@ class Release(Place):
 
     @property
     def is_unity(self) -> bool:
-        """Whether the place holds a real build."""
+        """Whether a real build is there."""
         return self.is_foreign and self.path.is_dir()
 
     def write(self, path: Path) -> None:
@@ -154,7 +154,7 @@ class Release(Place):
 
 
 @dataclass(frozen=True)
-class GpuMapping(Place):
+class GpuMapping(ClientFile):
     """The file in which the client stores which Vulkan device belongs to a CUDA device.
 
     If the file is missing and a program asks for a GPU (``gpu_device``, ``CUDA_VISIBLE_DEVICES``),

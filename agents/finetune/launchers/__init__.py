@@ -3,6 +3,6 @@
 Each program is a row of :data:`PROGRAMS`; :func:`write_files` writes all that it needs.
 """
 
-from agents.finetune.printing.write import PROGRAMS, write_files
+from agents.finetune.launchers.write import PROGRAMS, write_files
 
 __all__ = ["PROGRAMS", "write_files"]

@@ -39,7 +39,7 @@ _FEWEST_OWN = 20
 """The fewest characters that a dialect's text has beside its slots, to be known by them."""
 
 
-class Heard(BaseModel):
+class StockPhrases(BaseModel):
     """The paper's stock phrases: ``configs/dialects/heard.yaml``."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -177,9 +177,9 @@ def _openers(language: Language) -> _Openers:
 @lru_cache(maxsize=1)
 def _stock() -> _Openers:
     file = config_directory("dialects") / "heard.yaml"
-    heard = validated(Heard, read_yaml(file), f"{file}:")
-    kinds = {opener.lower(): kind for kind, openers in heard.openers.items() for opener in openers}
-    return kinds, _any_of(kinds, _BEGINS_SENTENCE), _last_of(heard.closers)
+    stock = validated(StockPhrases, read_yaml(file), f"{file}:")
+    kinds = {opener.lower(): kind for kind, openers in stock.openers.items() for opener in openers}
+    return kinds, _any_of(kinds, _BEGINS_SENTENCE), _last_of(stock.closers)
 
 
 def _any_of(openers: Mapping[str, ThoughtKind], begins: str) -> re.Pattern[str]:

@@ -1,4 +1,4 @@
-"""``python -m benchmarks.eyes``."""
+"""``python -m benchmarks.vision_probe``."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from agents.factory import load_settings
 from agents.vlm.tuned_model import agent_file
 from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import EXISTING_FOLDER
-from benchmarks.eyes.examine import Examiner, examine, figures
 from benchmarks.scoring.tables import print_tables
 from benchmarks.terminal import stdout
+from benchmarks.vision_probe.examine import Examiner, examine, figures
 from er_gym.data.frames import FrameSet
 from er_gym.tables import as_markdown
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from agents.finetune.printing.plan import (
+from agents.finetune.launchers.plan import (
     DATA,
-    Printed,
-    PrintPlan,
+    LauncherFiles,
+    LaunchPlan,
     Program,
     of_lora,
     of_transformers,
     yaml_text,
     zero3_text,
 )
-from agents.finetune.printing.sources import SourceJob
+from agents.finetune.launchers.sources import SourceJob
 from er_gym.data.exports.ms_swift import MS_SWIFT as EXPORT
 from er_gym.data.exports.sharegpt import FEEDBACK_TOKEN
 
@@ -24,7 +24,7 @@ _TRAIN = "train.yaml"
 _EMBEDDINGS = ("embed_tokens", "lm_head")
 
 
-def arguments(plan: PrintPlan) -> dict[str, Any]:
+def arguments(plan: LaunchPlan) -> dict[str, Any]:
     """The arguments of a run, by ms-swift's names. ``ENV`` are variables of the environment."""
     model, data, training = plan.settings.model, plan.settings.data, plan.settings.training
     build = plan.model.facts.programs[NAME]
@@ -72,7 +72,7 @@ def arguments(plan: PrintPlan) -> dict[str, Any]:
     return found
 
 
-def _write(plan: PrintPlan, folder: Path) -> Printed:
+def _write(plan: LaunchPlan, folder: Path) -> LauncherFiles:
     EXPORT.write(SourceJob.of(plan.source, folder / DATA, per_turn=False, copy=plan.copy))
     texts = {_TRAIN: yaml_text(arguments(plan)), **zero3_text(plan)}
     notes = [
@@ -91,7 +91,7 @@ def _write(plan: PrintPlan, folder: Path) -> Printed:
         )
     if plan.settings.model.lora is not None:
         notes.append("`swift export --adapters output/CHECKPOINT --merge_lora true` merges it.")
-    return Printed(
+    return LauncherFiles(
         texts=texts,
         command=("swift", "sft", _TRAIN),
         environment={"NPROC_PER_NODE": str(plan.gpus)},

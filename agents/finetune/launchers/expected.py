@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from agents.finetune.memory import GIB, Memory, ModelNumbers, Plan, memory
+from agents.finetune.launchers.plan import LaunchPlan
+from agents.finetune.memory import (
+    GIB,
+    MemoryEstimate,
+    ModelDimensions,
+    TuningSetup,
+    estimate_memory,
+)
 from agents.finetune.models import load_facts, model_names
-from agents.finetune.printing.plan import PrintPlan
 from agents.finetune.settings import FinetuneSettings, Lora
 from er_gym.tables import Table
 
@@ -17,14 +23,14 @@ PARTS = ("weights", "gradients", "optimizer", "activations", "logits", "overhead
 
 
 def expected(
-    numbers: ModelNumbers,
+    numbers: ModelDimensions,
     settings: FinetuneSettings,
     *,
     tokens: int,
     picture_tokens: int,
     gpus: int,
     new_tokens: bool = False,
-) -> Memory:
+) -> MemoryEstimate:
     """The memory on one GPU.
 
     Args:
@@ -36,7 +42,7 @@ def expected(
             token is new.
     """
     lora = settings.model.lora
-    plan = Plan(
+    plan = TuningSetup(
         precision="float32" if settings.model.dtype == "float32" else "bfloat16",
         lora_rank=lora.rank if lora else None,
         freeze=settings.model.freeze,
@@ -47,7 +53,7 @@ def expected(
         patches=picture_tokens * _PATCHES_A_TOKEN,
         gpus=1 if lora else gpus,
     )
-    found = memory(numbers, plan)
+    found = estimate_memory(numbers, plan)
     if lora is None or not new_tokens:
         return found
     more = numbers.embeddings
@@ -60,7 +66,7 @@ def expected(
     )
 
 
-def run_table(plan: PrintPlan, *, whole_embeddings: bool) -> Table:
+def run_table(plan: LaunchPlan, *, whole_embeddings: bool) -> Table:
     """A table of this run: at its longest conversation, and at the most it may have."""
     facts, limit = plan.facts, plan.settings.data.max_length
     share = facts.picture_tokens / max(1, facts.tokens)
@@ -83,7 +89,7 @@ def run_table(plan: PrintPlan, *, whole_embeddings: bool) -> Table:
     return Table("", ("GiB on each GPU", *PARTS, "sum"), tuple(lines), 1)
 
 
-def models_table(plan: PrintPlan) -> Table:
+def models_table(plan: LaunchPlan) -> Table:
     """A table of all models that er-gym knows, full and LoRA, at this run's length."""
     facts, settings = plan.facts, plan.settings
     lora = settings.model.lora or Lora()

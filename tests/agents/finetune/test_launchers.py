@@ -21,10 +21,10 @@ sys.path.append(str(Path(__file__).parents[2]))  # for the helpers beside the te
 
 from played_collection import make_collection
 
-import agents.finetune.printing.trl as trl_files
+import agents.finetune.launchers.trl as trl_files
+from agents.finetune.launchers import PROGRAMS, write_files
+from agents.finetune.launchers.sources import open_source, released
 from agents.finetune.models import model_names
-from agents.finetune.printing import PROGRAMS, write_files
-from agents.finetune.printing.sources import open_source, released
 from agents.finetune.settings import FinetuneSettings, load_settings
 from benchmarks.cli.finetune import PRINTABLE, finetune
 from er_gym.data.chat import Chat, ChatTurn

@@ -67,14 +67,14 @@ class _Member(Generic[Job]):
     Attributes:
         beginning: until it is ready, the reference of :class:`.Begun`.
         batches: what it has been given, in order: the reference of :class:`.Done`, and the jobs.
-        room: of its last job.
+        affinity: the affinity key of its last job.
         retiring: whether it gets no more.
     """
 
     actor: Any
     beginning: Any
     batches: deque[tuple[Any, list[_Try[Job]]]] = field(default_factory=deque)
-    room: Hashable = None
+    affinity: Hashable = None
     retiring: bool = False
 
     @property
@@ -84,59 +84,61 @@ class _Member(Generic[Job]):
 
 
 @dataclass(frozen=True)
-class Terms:
+class ActorOptions:
     """The resources and limits with which actors are started.
 
     Attributes:
-        options: of ``ActorClass.options``.
+        ray_options: of ``ActorClass.options``.
         memory: a worker with more resident memory is replaced, bytes.
         path: folders that actors add to their ``sys.path``.
         say: called with a message for the user while the cluster has no resources for an actor.
     """
 
-    options: dict[str, Any]
+    ray_options: dict[str, Any]
     memory: int
     path: Sequence[str]
     say: Callable[[str], None]
 
 
-class Crew(Generic[Job, Result]):
+class ActorPool(Generic[Job, Result]):
     """Does jobs; see the module.
 
     Args:
-        terms: of its actors.
+        options: of its actors.
         make: as :func:`er_gym.rollout.worker_pool.run_jobs` takes it.
         jobs: as there.
         workers: the largest number of actors.
         tries: as there.
-        room: of a job.
+        affinity_key: of a job, as there.
     """
 
     def __init__(
         self,
-        terms: Terms,
+        options: ActorOptions,
         make: Callable[[], Callable[[Job], Result]],
         jobs: Iterable[Job],
         *,
         workers: int,
         tries: int,
-        room: Callable[[Job], Hashable],
+        affinity_key: Callable[[Job], Hashable],
     ) -> None:
-        self._terms, self._workers, self._tries = terms, workers, tries
+        self._options, self._workers, self._tries = options, workers, tries
         pickled: bytes = cloudpickle.dumps(make)  # type: ignore[no-untyped-call]
         self._make = ray.put(pickled)
-        self._queue = WarmQueue((_Try(job) for job in jobs), lambda attempt: room(attempt.job))
+        self._queue = WarmQueue(
+            (_Try(job) for job in jobs), lambda attempt: affinity_key(attempt.job)
+        )
         self._members: list[_Member[Job]] = []
         self._job_seconds = 0.0
         self._deaths = 0
         self._told_of_memory = False
-        self._hire_after = self._told = time.monotonic()
+        self._start_after = self._told = time.monotonic()
 
     def results(self) -> Generator[tuple[Job, Result | LostJob], None, None]:
         """Each job with its result, as :func:`er_gym.rollout.worker_pool.run_jobs` yields them."""
         try:
             while self._queue or any(member.batches for member in self._members):
-                self._hire()
+                self._start_actors()
                 for member in self._members:
                     self._give(member)
                 yield from self._news()
@@ -146,13 +148,13 @@ class Crew(Generic[Job, Result]):
 
     # -- actors ----------------------------------------------------------------------------------
 
-    def _hire(self) -> None:
+    def _start_actors(self) -> None:
         """Start actors, as many as there are jobs for."""
         at_work = sum(len(batch) for member in self._members for _, batch in member.batches)
         wanted = min(self._workers, len(self._queue) + at_work)
-        while len(self._members) < wanted and time.monotonic() >= self._hire_after:
-            actor = start_actor(JobActor, self._terms.options)
-            beginning = actor.begin.remote(Origin.here(), self._terms.path, self._make)
+        while len(self._members) < wanted and time.monotonic() >= self._start_after:
+            actor = start_actor(JobActor, self._options.ray_options)
+            beginning = actor.begin.remote(Origin.here(), self._options.path, self._make)
             self._members.append(_Member(actor, beginning))
 
     def _dismiss(self, member: _Member[Job]) -> None:
@@ -166,8 +168,8 @@ class Crew(Generic[Job, Result]):
             and not member.retiring
             and len(member.batches) < self._depth(member)
         ):
-            others = [one.room for one in self._members if one is not member]
-            member.room, batch = self._queue.take(self._batch_size(), member.room, others)
+            others = [one.affinity for one in self._members if one is not member]
+            member.affinity, batch = self._queue.take(self._batch_size(), member.affinity, others)
             jobs = pickle.dumps([attempt.job for attempt in batch])
             member.batches.append((member.actor.do.remote(jobs), batch))
 
@@ -193,8 +195,8 @@ class Crew(Generic[Job, Result]):
     def _news(self) -> Generator[tuple[Job, Result | LostJob], None, None]:
         """Wait for the next answers and handle them."""
         asked = {member.next_ref: member for member in self._members if member.next_ref}
-        if not asked:  # all died; wait until others may be hired
-            time.sleep(max(0.0, self._hire_after - time.monotonic()))
+        if not asked:  # all died; wait until others may be started
+            time.sleep(max(0.0, self._start_after - time.monotonic()))
             return
         ready, rest = ray.wait([*asked], timeout=_LOOK_SECONDS)
         if rest and ready:
@@ -221,7 +223,7 @@ class Crew(Generic[Job, Result]):
         each = done.seconds / len(batch)
         self._job_seconds = each if not self._job_seconds else 0.8 * self._job_seconds + 0.2 * each
         self._deaths = 0
-        if done.memory > self._terms.memory:
+        if done.memory > self._options.memory:
             member.retiring = True
             self._tell_of_memory(done.memory)
         if member.retiring and not member.batches:
@@ -253,7 +255,7 @@ class Crew(Generic[Job, Result]):
                     self._queue.put_first(attempt)
 
     def _wait_after_death(self, error: RayError) -> None:
-        """Hire again at once after one death, later and later after several in a row."""
+        """Start actors again at once after one death, later and later after several in a row."""
         self._deaths += 1
         if self._deaths > _MOST_DEATHS:
             raise WorkerSetupError(
@@ -261,16 +263,16 @@ class Crew(Generic[Job, Result]):
             )
         if self._deaths > len(self._members) + 1:
             wait = min(_LONGEST_WAIT, _FIRST_WAIT * 2 ** (self._deaths - 2))
-            self._hire_after = time.monotonic() + wait
+            self._start_after = time.monotonic() + wait
 
     def _tell_of_memory(self, memory: int) -> None:
         """Say once that workers grow larger than they are allowed to."""
         if not self._told_of_memory:
             self._told_of_memory = True
-            self._terms.say(
+            self._options.say(
                 f"a worker takes {memory / 2**30:.1f} GiB, more than the "
-                f"{self._terms.memory / 2**30:.1f} GiB that it has asked for, and is replaced; if "
-                "that happens often, give a larger --worker-memory"
+                f"{self._options.memory / 2**30:.1f} GiB that it has asked for, and is replaced; "
+                "if that happens often, give a larger --worker-memory"
             )
 
     def _tell_if_waiting(self) -> None:
@@ -278,7 +280,7 @@ class Crew(Generic[Job, Result]):
         waiting = self._members and all(member.beginning for member in self._members)
         if waiting and time.monotonic() - self._told > _TELL_SECONDS:
             self._told = time.monotonic()
-            self._terms.say(no_place(len(self._members), self._terms.options))
+            self._options.say(waiting_message(len(self._members), self._options.ray_options))
 
 
 def is_nodes_fault(error: RayError) -> bool:
@@ -295,7 +297,7 @@ def first_line(error: BaseException) -> str:
     return why.partition(". ")[0].rstrip(".")
 
 
-def no_place(wanted: int, options: dict[str, Any]) -> str:
+def waiting_message(wanted: int, options: dict[str, Any]) -> str:
     """The message while no worker has started: it says whether the cluster lacks resources."""
     free: dict[str, float] = ray.available_resources()  # type: ignore[no-untyped-call]
     cpus, memory = free.get("CPU", 0), free.get("memory", 0)

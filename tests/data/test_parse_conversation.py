@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from support import in_one_test
 
-from er_gym.data.heard import UserMessage, language_of, thoughts_of, user_message
+from er_gym.data.parse_conversation import UserMessage, language_of, thoughts_of, user_message
 
 
 @in_one_test(

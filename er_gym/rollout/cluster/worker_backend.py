@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import ray
 
-from er_gym.rollout.cluster.crew import Crew, Terms
+from er_gym.rollout.cluster.actor_pool import ActorOptions, ActorPool
 from er_gym.rollout.cluster.env_worker import RayEnvWorker
 from er_gym.rollout.cluster.settings import RaySettings
 from er_gym.rollout.env_worker import EnvWorker
@@ -21,8 +21,9 @@ Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
-class RayMachines:
-    """The nodes of a cluster that this process has joined: :class:`.rollout.machines.Machines`.
+class RayBackend:
+    """The nodes of a cluster that this process has joined; see
+    :class:`er_gym.rollout.worker_backend.WorkerBackend`.
 
     Attributes:
         settings: how they are used.
@@ -33,15 +34,15 @@ class RayMachines:
     say: Callable[[str], None] = field(compare=False)
 
     @property
-    def is_here(self) -> bool:
+    def is_local(self) -> bool:
         return not self.settings.address
 
     @property
     def shares_files(self) -> bool:
-        return self.is_here or self.settings.shared_files
+        return self.is_local or self.settings.shared_files
 
     @property
-    def places(self) -> int:
+    def capacity(self) -> int:
         """How many workers the cluster's present nodes have processors for, at least 1."""
         has: dict[str, float] = ray.cluster_resources()  # type: ignore[no-untyped-call]
         return max(1, math.floor(has.get("CPU", 0) / (self.settings.cpus or 1) + 1e-6))
@@ -53,24 +54,26 @@ class RayMachines:
         *,
         workers: int,
         tries: int = 3,
-        room: Callable[[Job], Hashable] | None = None,
+        affinity_key: Callable[[Job], Hashable] | None = None,
     ) -> Generator[tuple[Job, Result | LostJob], None, None]:
         if workers < 1:
             raise ValueError(f"workers is {workers}; give a whole number from 1")
-        room = room or (lambda job: None)
-        crew = Crew(self._terms, make, jobs, workers=workers, tries=tries, room=room)
-        return crew.results()
+        affinity_key = affinity_key or (lambda job: None)
+        pool = ActorPool(
+            self._options, make, jobs, workers=workers, tries=tries, affinity_key=affinity_key
+        )
+        return pool.results()
 
     def start_env_worker(self, slots: Sequence[int], env: Mapping[str, Any]) -> EnvWorker:
-        return RayEnvWorker(self._terms, slots, env)
+        return RayEnvWorker(self._options, slots, env)
 
     @property
-    def _terms(self) -> Terms:
-        options = {
+    def _options(self) -> ActorOptions:
+        ray_options = {
             "num_cpus": self.settings.cpus,
             "memory": self.settings.memory,
-            "max_restarts": 0,  # the crew replaces actors, since only it knows their jobs
+            "max_restarts": 0,  # the pool replaces actors, since only it knows their jobs
             "max_task_retries": 0,
         }
         path = tuple(sys.path) if self.shares_files else ()
-        return Terms(options, self.settings.memory, path, self.say)
+        return ActorOptions(ray_options, self.settings.memory, path, self.say)

@@ -10,8 +10,8 @@ from typing import Any
 
 import yaml
 
+from agents.finetune.launchers.sources import DataFacts, Source
 from agents.finetune.models import ChosenModel
-from agents.finetune.printing.sources import Facts, Source
 from agents.finetune.settings import FinetuneSettings
 
 DATA, OUTPUT = "data", "output"
@@ -20,7 +20,7 @@ ZERO3_FILE = "zero3.json"
 
 
 @dataclass(frozen=True)
-class PrintPlan:
+class LaunchPlan:
     """A run that is printed.
 
     Attributes:
@@ -34,7 +34,7 @@ class PrintPlan:
     settings: FinetuneSettings
     model: ChosenModel
     source: Source
-    facts: Facts
+    facts: DataFacts
     gpus: int
     copy: bool = False
 
@@ -55,7 +55,7 @@ class PrintPlan:
 
 
 @dataclass(frozen=True)
-class Printed:
+class LauncherFiles:
     """The files of a program.
 
     Attributes:
@@ -83,10 +83,10 @@ class Program:
     """
 
     name: str
-    write: Callable[[PrintPlan, Path], Printed]
+    write: Callable[[LaunchPlan, Path], LauncherFiles]
 
 
-def of_transformers(plan: PrintPlan) -> dict[str, Any]:
+def of_transformers(plan: LaunchPlan) -> dict[str, Any]:
     """Arguments of transformers' ``TrainingArguments``, which these programs take by its names."""
     training = plan.settings.training
     return {
@@ -107,7 +107,7 @@ def of_transformers(plan: PrintPlan) -> dict[str, Any]:
     }
 
 
-def of_lora(plan: PrintPlan, rank: str, alpha: str, dropout: str, targets: str) -> dict[str, Any]:
+def of_lora(plan: LaunchPlan, rank: str, alpha: str, dropout: str, targets: str) -> dict[str, Any]:
     """The arguments of the adapter, by the names that a program has for them; none without one."""
     lora = plan.settings.model.lora
     if lora is None:
@@ -121,12 +121,12 @@ def yaml_text(arguments: Mapping[str, Any]) -> str:
     return yaml.safe_dump(arguments, sort_keys=False, allow_unicode=True)
 
 
-def zero3_text(plan: PrintPlan) -> dict[str, str]:
+def zero3_text(plan: LaunchPlan) -> dict[str, str]:
     """The file for ZeRO-3 and its content; none for a run that is not divided among GPUs."""
     return {ZERO3_FILE: json.dumps(zero3(plan), indent=2) + "\n"} if plan.sharded else {}
 
 
-def zero3(plan: PrintPlan) -> dict[str, Any]:
+def zero3(plan: LaunchPlan) -> dict[str, Any]:
     """DeepSpeed's configuration for ZeRO-3. Transformers fills in what is ``auto``."""
     return {
         "train_batch_size": "auto",

@@ -9,18 +9,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from agents.finetune.printing.plan import (
+from agents.finetune.launchers.plan import (
     DATA,
     OUTPUT,
-    Printed,
-    PrintPlan,
+    LauncherFiles,
+    LaunchPlan,
     Program,
     of_lora,
     of_transformers,
     yaml_text,
     zero3_text,
 )
-from agents.finetune.printing.sources import SourceJob
+from agents.finetune.launchers.sources import SourceJob
 from er_gym.data.exports.sharegpt import SHAREGPT
 
 NAME = "llama-factory"
@@ -28,7 +28,7 @@ _ATTENTION = {"": "auto", "flash_attention_2": "fa2", "sdpa": "sdpa", "eager": "
 _TRAIN, _MERGE = "train.yaml", "merge.yaml"
 
 
-def arguments(plan: PrintPlan) -> dict[str, Any]:
+def arguments(plan: LaunchPlan) -> dict[str, Any]:
     """The arguments of a run, by LLaMA-Factory's names."""
     model, data, training = plan.settings.model, plan.settings.data, plan.settings.training
     found: dict[str, Any] = {
@@ -71,7 +71,7 @@ def arguments(plan: PrintPlan) -> dict[str, Any]:
     return found
 
 
-def _merge(plan: PrintPlan) -> dict[str, Any]:
+def _merge(plan: LaunchPlan) -> dict[str, Any]:
     """The arguments of ``llamafactory-cli export``, which merges an adapter into the model."""
     found: dict[str, Any] = {
         "model_name_or_path": plan.model.weights,
@@ -87,7 +87,7 @@ def _merge(plan: PrintPlan) -> dict[str, Any]:
     return found
 
 
-def _write(plan: PrintPlan, folder: Path) -> Printed:
+def _write(plan: LaunchPlan, folder: Path) -> LauncherFiles:
     job = SourceJob.of(plan.source, folder / DATA, per_turn=plan.facts.partly, copy=plan.copy)
     SHAREGPT.write(job)
     texts = {_TRAIN: yaml_text(arguments(plan)), **zero3_text(plan)}
@@ -121,7 +121,7 @@ def _write(plan: PrintPlan, folder: Path) -> Printed:
             f"`llamafactory-cli export {_MERGE}` merges the adapter into the model, for serving or "
             "as the base of the next stage."
         )
-    return Printed(
+    return LauncherFiles(
         texts=texts,
         command=("llamafactory-cli", "train", _TRAIN),
         environment={"FORCE_TORCHRUN": "1", "NPROC_PER_NODE": str(plan.gpus)},

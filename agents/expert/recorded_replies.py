@@ -29,7 +29,7 @@ _ENDS = (".", "!", "?", "…", "。", "！", "？", "\n", '"', "”")
 
 
 @dataclass(frozen=True)
-class Said:
+class RecordedThoughts:
     """What a model thought at one turn.
 
     Attributes:
@@ -42,7 +42,7 @@ class Said:
 
 
 @dataclass(frozen=True)
-class OwnWords:
+class RecordedReplies:
     """What a model said in an episode.
 
     Attributes:
@@ -51,7 +51,7 @@ class OwnWords:
         tokens: the length of the whole conversation, in the model's tokens; 0 if unknown.
     """
 
-    turns: tuple[Said, ...]
+    turns: tuple[RecordedThoughts, ...]
     language: Language
     tokens: int
 
@@ -61,7 +61,7 @@ class OwnWords:
         return not any(turn.thoughts for turn in self.turns)
 
 
-def own_words(run: Path, episode: EpisodeRecord) -> OwnWords | None:
+def recorded_replies(run: Path, episode: EpisodeRecord) -> RecordedReplies | None:
     """What the model of a run said in an episode; None if the agent had no conversation.
 
     Raises:
@@ -83,7 +83,7 @@ def own_words(run: Path, episode: EpisodeRecord) -> OwnWords | None:
     prompts = record.settings.get("prompts", {})
     language: Language = "zh" if prompts.get("language") == "zh" else "en"
     dialect = str(prompts.get("dialect") or "")
-    return OwnWords(
+    return RecordedReplies(
         tuple(_said(each, record.messages, dialect, language) for each in record.rounds),
         language,
         max((each.prompt_tokens + each.completion_tokens for each in record.rounds), default=0),
@@ -92,7 +92,7 @@ def own_words(run: Path, episode: EpisodeRecord) -> OwnWords | None:
 
 def _said(
     this: RoundRecord, messages: Sequence[MessageRecord], dialect: str, language: Language
-) -> Said:
+) -> RecordedThoughts:
     message = messages[this.message] if this.message < len(messages) else None
     text = (
         "" if message is None else "".join(each for each in message.parts if isinstance(each, str))
@@ -114,7 +114,7 @@ def _said(
         completion_tokens=this.completion_tokens,
         cost=this.cost,
     )
-    return Said(tuple(thoughts), reply)
+    return RecordedThoughts(tuple(thoughts), reply)
 
 
 def split_speech(text: str, dialect: str, language: Language) -> list[tuple[ThoughtKind, str]]:
