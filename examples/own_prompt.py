@@ -11,9 +11,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from agents.vlm.factory import AgentFactory
-
 import er_gym
+from agents.factory import AgentFactory
 from agents.vlm.settings import AgentSettings
 from er_gym.tasks.suites import config_directory
 

@@ -16,7 +16,7 @@ from episodes_by_hand import Episode
 
 from agents import make_agent
 from agents.rl.rewards import with_reward
-from benchmarks.checks.faulty_server import Exchange, FaultyServer, completion
+from benchmarks.harness.chat_server import ChatServer, Exchange, completion
 from er_gym import EmbodiedEnv, load_suite
 from er_gym.rollout.run_directory import RunDirectory
 
@@ -114,7 +114,7 @@ def test_the_own_prompt_reaches_the_model(run_example: Run) -> None:
         said = "<Thinking>Let me see.</Thinking><DecisionMaking>end</DecisionMaking>"
         exchange.send(json.dumps(completion(choices__0__message__content=said)).encode())
 
-    with FaultyServer(answer) as server:
+    with ChatServer(answer) as server:
         said = run_example("own_prompt", server.url, "a-model")
     assert said.count("Thinking: Let me see.\n    end -> ") == 3
     assert said.count("success: False") == 3
