@@ -82,6 +82,7 @@ def test_intervals_are_whiskers_or_a_band() -> None:
     (bars,) = (each for each in axes.collections if len(each.get_segments()) == 2)
     assert [segment[:, 1].tolist() for segment in bars.get_segments()] == [[3, 6], [5, 5]]
     (axes,) = draw(Chart("", Axis(), Axis(), [Series("a", found)])).axes
+    assert not any(spine.get_visible() for spine in axes.spines.values())
     (band,) = axes.collections
     assert {3.0, 6.0} <= set(band.get_paths()[0].vertices[:, 1])
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 
 from er_gym import EmbodiedEnv
 from er_gym.data.cells import COLUMNS, ROWS, cells_of, on_grid
 from er_gym.envs.perception import Perception
 from er_gym.tasks.suites import load_suite
+from er_gym.thor.objects import KIND_OF, TYPES
 
 
 def seen(width: int, height: int) -> Perception:
@@ -39,6 +43,16 @@ def test_each_square_names_what_is_there() -> None:
             checked += bool(name)
     assert checked > 5
     assert len({*names}) > 5
+
+
+def test_an_object_stands_for_a_square_before_the_room_does() -> None:
+    """However little of the picture is the room, and whichever type comes first."""
+    instances = np.ones((ROWS * 2, COLUMNS * 2), dtype=np.int64)
+    instances[:2, :2] = [[0, 0], [0, 1]]  # three quarters of the first square are the room's
+    for name in (TYPES[0], "Mug"):
+        objects: Any = SimpleNamespace(kinds=np.array([KIND_OF[name]]))
+        perception: Any = SimpleNamespace(instances=instances, objects=objects)
+        assert cells_of(perception) == (("", name), "1" * ROWS * COLUMNS)
 
 
 def test_another_grid_takes_the_rarest_thing_of_each_square() -> None:

@@ -72,6 +72,12 @@ def test_every_type_is_drawn_where_none_is_asked_for() -> None:
     assert drawn_types == set(TASK_TYPES)
 
 
+def test_all_types_that_are_asked_for_are_drawn(make: Callable[..., EmbodiedEnv]) -> None:
+    types = ["single_search", "single_pickup"]
+    env = make("mini", task_type=types)
+    assert {drawn(env, seed).type.name for seed in range(12)} == {*types}
+
+
 def test_without_a_seed_episodes_go_on_from_the_last_one(make: Callable[..., EmbodiedEnv]) -> None:
     one, other = make("mini"), make("mini")
     rows = [[drawn(env, 7), *(drawn(env) for _ in range(5))] for env in (one, other)]
