@@ -38,7 +38,7 @@ from agents.scripted.searcher import SearcherAgent
 from agents.zoo.index import PREFIX as ZOO_PREFIX
 from agents.zoo.index import resolved
 from er_gym.activity import begin_import
-from er_gym.extras import MissingPackage
+from er_gym.extras import MissingPackage, is_own
 from er_gym.plugins import PluginError, Registry, error_line
 from er_gym.rollout.agent import Agent, Decision, MakeAgent
 from er_gym.tasks.task import Task
@@ -145,6 +145,8 @@ def _rl_agent(name: str, path: str) -> Agent:
     try:
         from agents.rl.agent import RLAgent  # late: torch
     except ImportError as error:
+        if is_own(error):
+            raise
         raise MissingPackage(f"agent {name}", str(error.name), "er-gym[rl]") from error
     return RLAgent(path)
 

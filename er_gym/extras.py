@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 
+def is_own(error: ImportError) -> bool:
+    """Whether a module of er-gym's own cannot be imported: no package that could be installed."""
+    return (error.name or "").partition(".")[0] in ("er_gym", "agents", "benchmarks")
+
+
 class MissingPackage(ValueError):
     """A part of er-gym needs a package that is not installed; the message says what to install.
 

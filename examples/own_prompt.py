@@ -33,7 +33,7 @@ with tempfile.TemporaryDirectory() as folder:
     shutil.copytree(config_directory("prompts") / "default", folder, dirs_exist_ok=True)
     Path(folder, "en", "system.jinja").write_text(SYSTEM)
     settings = AgentSettings(
-        sees="text",  # for models without eyes; "pictures" for the others
+        sees="text",  # for models without vision; "pictures" for the others
         prompts={"profile": folder},
         server={"base_url": url},
     )

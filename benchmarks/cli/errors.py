@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 CRASHED, STOPPED, INTERRUPTED = 1, 3, 130
 """Exit codes: episodes crashed; a budget or the server stopped the run; Ctrl-C. Bad input is 2."""
-T = TypeVar("T")
 
 
 class BadInput(click.ClickException):
@@ -63,8 +62,10 @@ def needing(what: str, install: str) -> Iterator[None]:
     try:
         yield
     except ImportError as error:
-        from er_gym.extras import MissingPackage
+        from er_gym.extras import MissingPackage, is_own
 
+        if is_own(error):
+            raise
         raise BadInput(str(MissingPackage(what, error.name or str(error), install))) from error
 
 

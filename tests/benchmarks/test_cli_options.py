@@ -91,6 +91,11 @@ def test_a_missing_package_is_named_with_what_brings_it() -> None:
         importlib.import_module("no_such_package")
 
 
+def test_a_module_of_our_own_is_no_package_to_install() -> None:
+    with pytest.raises(ModuleNotFoundError, match=r"er_gym\.no_such_module"), needing("x", "y"):
+        importlib.import_module("er_gym.no_such_module")
+
+
 def test_only_the_beginning_of_a_context_is_bad_input() -> None:
     ended = []
 
