@@ -28,6 +28,7 @@ MAY_USE = {
     "er_gym/data/exports": ("data", "minari"),
     "agents": (),
     "agents/finetune": ("finetune",),
+    "agents/finetune/gguf_model.py": ("finetune", "gguf"),
     "agents/finetune/launchers/trl_script.py": ("finetune", "trl"),
     "agents/packing.py": ("rl",),
     "agents/rl": ("rl",),

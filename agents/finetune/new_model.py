@@ -80,24 +80,51 @@ def make_model(
         ValueError: the directory exists and holds anything else, or transformers does not accept
             the architecture.
     """
-    if directory.exists() and not (directory / transformers.CONFIG_NAME).is_file():
-        raise _taken(directory)
+    check_free(directory)
     begin("learning the tokenizer from the conversations")
     tokenizer = make_tokenizer(texts, architecture.vocabulary)
     begin("making the weights")
     config = _config(architecture, tokenizer)
+    model = random_model(config, seed, architecture.sees)
+    processor = _image_processor(config) if architecture.sees else None
+    return save_model(model, tokenizer, directory, processor)
+
+
+def random_model(config: transformers.PretrainedConfig, seed: int, sees: bool = False) -> Any:
+    """A model with random weights, float32.
+
+    Raises:
+        ValueError: transformers does not accept the configuration.
+    """
+    maker = transformers.AutoModelForImageTextToText if sees else transformers.AutoModelForCausalLM
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         try:
-            model = _maker(architecture).from_config(config, dtype=torch.float32)
+            return maker.from_config(config, dtype=torch.float32)
         except (ValueError, TypeError, RuntimeError, ZeroDivisionError) as error:
             problem = " ".join(str(error).split())[:300]
             raise ValueError(
-                f"transformers does not accept this {architecture.family}: {problem}"
+                f"transformers does not accept this {config.model_type}: {problem}"
             ) from None
+
+
+def check_free(directory: Path) -> None:
+    """Raise ValueError if the directory exists and holds no model."""
+    if directory.exists() and not (directory / transformers.CONFIG_NAME).is_file():
+        raise _taken(directory)
+
+
+def save_model(
+    model: Any, tokenizer: Any, directory: Path, processor: Mapping[str, Any] | None = None
+) -> Path:
+    """Write a model, its tokenizer and its image processor's settings; all or nothing.
+
+    Raises:
+        ValueError: the directory exists and holds anything else than this very model.
+    """
     ends = [tokenizer.eos_token_id, tokenizer.pad_token_id]
     model.generation_config = transformers.GenerationConfig(
-        eos_token_id=ends, pad_token_id=ends[1], do_sample=False
+        eos_token_id=list(dict.fromkeys(ends)), pad_token_id=ends[1], do_sample=False
     )
     begin(f"writing {directory}")
     directory.parent.mkdir(parents=True, exist_ok=True)
@@ -108,8 +135,8 @@ def make_model(
         made = Path(folder) / "model"
         tokenizer.save_pretrained(made)
         model.save_pretrained(made)
-        if architecture.sees:
-            text = json.dumps(_image_processor(config), indent=2) + "\n"
+        if processor is not None:
+            text = json.dumps(processor, indent=2) + "\n"
             (made / "preprocessor_config.json").write_text(text, encoding="utf-8")
         if not directory.exists():
             shutil.move(made, directory)
@@ -160,12 +187,6 @@ def make_tokenizer(texts: Iterable[str], vocabulary: int) -> transformers.PreTra
     )
     tokenizer.chat_template = _TEMPLATE
     return tokenizer
-
-
-def _maker(architecture: Architecture) -> Any:
-    if architecture.sees:
-        return transformers.AutoModelForImageTextToText
-    return transformers.AutoModelForCausalLM
 
 
 def _config(architecture: Architecture, tokenizer: Any) -> transformers.PretrainedConfig:

@@ -139,11 +139,13 @@ class Pictures:
         scene_graph_of(world.scene.name).draw(world, camera, self._depth)
 
 
-def environment(scenes: list[str], size: tuple[int, int]) -> EmbodiedEnv:
+def environment(scenes: list[str], size: tuple[int, int], device: str = "cpu") -> EmbodiedEnv:
     """An environment whose every episode is in one of the scenes, at random."""
     tasks = [free_play(name) for name in scenes]
     width, height = size
-    return EmbodiedEnv(tasks, obs_mode="rgb", width=width, height=height, instances="explore")
+    return EmbodiedEnv(
+        tasks, obs_mode="rgb", width=width, height=height, instances="explore", render_device=device
+    )
 
 
 # -- MuJoCo ----------------------------------------------------------------------------------------
