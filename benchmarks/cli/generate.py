@@ -150,6 +150,8 @@ def _order(
 
     told = {name: value for name, value in given.items() if value is not None}
     config = None if suite is None else suite_config(suite)
+    parts = ["er-gym", "tasks", "generate", *(["--suite", suite] if suite else [])]
+    parts += ["--out", out.name] if out else []
     base = config.generate.model_dump() if config and config.generate else {"total": _DEFAULT_TOTAL}
     if out is None:
         if suite is None:
@@ -164,7 +166,6 @@ def _order(
             f"--out {out}: the name of a generated task file must end in .jsonl or .jsonl.gz"
         )
     stem = out.name.removesuffix(".gz").removesuffix(".jsonl")
-    parts = ["er-gym", "tasks", "generate", *(["--suite", suite] if suite else ["--out", out.name])]
     for name, value in told.items():
         parts += [f"--{name.replace('_', '-')}", _option_value(value)]
     if "scenes" in told and told["scenes"] not in SCENES:

@@ -341,7 +341,7 @@ def test_a_bundled_card_tells_of_the_bundled_tasks(name: str) -> None:
 
     text = file.with_name(f"{name}.md").read_text(encoding="utf-8")
     assert f"`{suite.digest}`" in text
-    command = f"er-gym tasks generate --suite {name} --seed 0"
+    command = f"er-gym tasks generate --suite {name} --out {file.name} --seed 0"
     assert text == card(name, config.description, suite.tasks, made, command)
 
 

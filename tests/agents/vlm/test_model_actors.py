@@ -36,7 +36,7 @@ def settings(**local):
     )
 
 
-def test_copies_reply_as_a_model_here_also_after_one_has_died(model):
+def test_copies_reply_as_a_model_here_also_after_one_has_died(model, tmp_path):
     talks = [(Message("user", (f"Where is the mug, {n}?",)),) for n in range(6)]
     here = LocalClient(model, settings())
     wanted = [here.reply(talk, seed) for seed, talk in enumerate(talks)]
@@ -60,10 +60,10 @@ def test_copies_reply_as_a_model_here_also_after_one_has_died(model):
         with pytest.raises(ModelError, match=r"lower pictures\.keep"):
             actors.reply((Message("user", ("mug " * 50_000,)),), 0)
         actors.close()
+        with pytest.raises(ValueError, match="empty"):  # what stands in the way is one line
+            ModelActors(str(tmp_path / "empty"), settings(actors=1, actor_cpus=0.1))
 
 
-def test_what_stands_in_the_way_is_one_line(model, tmp_path):
+def test_actors_need_a_cluster(model):
     with pytest.raises(ValueError, match=r"local\.actors needs a cluster: give --executor ray"):
         ModelActors(model, settings(actors=1))
-    with ray_backend(RaySettings(), print), pytest.raises(ValueError, match="empty"):
-        ModelActors(str(tmp_path / "empty"), settings(actors=1, actor_cpus=0.1))
