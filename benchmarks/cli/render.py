@@ -180,15 +180,16 @@ def play(
     Each step's picture is written to a file, and shown in a window if possible.
     """
     from er_gym.envs.embodied_env import EmbodiedEnv
+    from er_gym.rollout.selection import select
     from er_gym.tasks.suites import load_suite
     from er_gym.writing import check_output, make_folder
 
     with bad_input():
-        tasks = [t for t in load_suite(suite).tasks if scene is None or t.scene == scene]
-    if task_id is not None:
-        tasks = [task for task in tasks if task.id == task_id]
+        known = select(load_suite(suite).tasks, task_ids=() if task_id is None else (task_id,))
+    tasks = [task for task in known if scene is None or task.scene == scene]
     if not tasks:
-        raise BadInput(f"the suite {suite} has no such task; `er-gym suites` lists the suites")
+        scenes = ", ".join(sorted({task.scene for task in known})[:3])
+        raise BadInput(f"no task to play in {scene}; the scenes of {suite} are such as {scenes}")
     with bad_input():
         make_folder(frames)
         for file in frames.glob("[0-9][0-9][0-9].png"):

@@ -204,4 +204,6 @@ def _suite(name: str) -> Suite:
 
     path = Path(name)
     doing(f"reading the tasks of {name}")
-    return load_suite(name) if name in suite_names() or not path.exists() else suite_from_file(path)
+    if name in suite_names() or not (path.exists() or name.endswith((".json", ".jsonl", ".gz"))):
+        return load_suite(name)
+    return suite_from_file(path)

@@ -40,7 +40,7 @@ def test_each_sort_of_picture(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--scene", "FloorPlan999"], "FloorPlan1-30"),
+        (["--scene", "FloorPlan20399"], "FloorPlan1-30"),
         (["--scene", "FloorPlan1", "--pose", "here"], "such as 1.0,-0.5,90"),
         (["--scene", "FloorPlan1", "--pose", "50,50,0"], "GetReachablePositions"),
     ],
@@ -77,11 +77,23 @@ def test_a_person_plays_and_the_frames_are_kept(tmp_path: Path) -> None:
     assert np.asarray(Image.open(frames / "000.png")).shape == (450, 800, 3)
 
 
-def test_playing_what_is_not_there_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--task", "nope"), "no task with the id 'nope'; ids here are such as FloorPlan"),
+        (
+            ("--scene", "FloorPlan203"),
+            "no task to play in FloorPlan203; the scenes of mini are such as",
+        ),
+    ],
+)
+def test_playing_what_is_not_there_is_one_line(
+    options: tuple[str, str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit) as ended:
-        main(["play", "--task", "no-such-task", "--no-window"])
+        main(["play", *options, "--no-window"])
     assert ended.value.code == 2
-    assert "no such task" in capsys.readouterr().err
+    assert told in capsys.readouterr().err
 
 
 def test_pictures_of_others_are_replaced_with_force_only(
