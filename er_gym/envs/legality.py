@@ -190,14 +190,8 @@ def available_objects(perception: Perception, navigated_to: str = "") -> Availab
         table.centre[:, 0] - perception.pose.x, table.centre[:, 2] - perception.pose.z
     )
     plain = visible & (distance < can.within)
-    reach = plain
-    row = table.row.get(navigated_to)
-    if row is not None and table.contents[row]:
-        alike = can.alike.get(row)
-        if alike is None:
-            kinds = type_mask(table.kinds[list(table.contents[row])])
-            alike = can.alike[row] = kinds[table.kinds] & (can.within > 0)
-        reach = plain | (visible & alike)
+    alike = alike_objects(table, navigated_to)
+    reach = plain if alike is None else plain | (visible & alike)
     navigable = plain.nonzero()[0]
     standing, burners = can.on_burners
     return AvailableObjects(
@@ -206,6 +200,20 @@ def available_objects(perception: Perception, navigated_to: str = "") -> Availab
         interactable=navigable if reach is plain else reach.nonzero()[0],
         covered=burners[reach[standing]],
     )
+
+
+def alike_objects(table: ObjectTable, navigated_to: str) -> NDArray[np.bool_] | None:
+    """(N,) bool: the objects of the types that lie in the receptacle last navigated to, without the
+    floor and the held object; None if nothing lies in it."""
+    row = table.row.get(navigated_to)
+    if row is None or not table.contents[row]:
+        return None
+    can = affordances(table)
+    alike = can.alike.get(row)
+    if alike is None:
+        kinds = type_mask(table.kinds[list(table.contents[row])])
+        alike = can.alike[row] = kinds[table.kinds] & (can.within > 0)
+    return alike
 
 
 class KnownTypes:

@@ -86,7 +86,7 @@ each of :data:`FEATURES`."""
 _LAST = {verb: SCALARS.index(f"last {verb}") for verb in (*verbs.BARE_VERBS, *verbs.OBJECT_VERBS)}
 _ROW = {feature: row for row, feature in enumerate(FEATURES)}
 _FIRST_DID = _ROW[_DID[0]]
-_OFTEN = 4
+OFTEN = 4
 """``did`` counts no further than this."""
 _ROOM_SCALE = 10.0
 """The offsets from the start are divided by this many metres."""
@@ -242,16 +242,21 @@ def _relative_pose(situation: Situation) -> tuple[float, ...]:
     )
 
 
-def _state(situation: Situation) -> NDArray[np.float32]:
-    memory, objects = situation.memory, situation.perception.objects
-    last = memory.last
-    scalars = (
+def pose_and_episode(situation: Situation) -> tuple[float, ...]:
+    """The first of :data:`SCALARS`, of the agent and the episode; not clipped yet."""
+    return (
         *_relative_pose(situation),
         situation.steps / situation.max_steps,
         float(situation.success),
-        float(objects.held >= 0),
-        memory.repeats / MAX_REPEATS,
+        float(situation.perception.objects.held >= 0),
+        situation.memory.repeats / MAX_REPEATS,
     )
+
+
+def _state(situation: Situation) -> NDArray[np.float32]:
+    memory, objects = situation.memory, situation.perception.objects
+    last = memory.last
+    scalars = pose_and_episode(situation)
     vector = np.zeros(len(STATE_LAYOUT), dtype=np.float32)
     vector[: len(scalars)] = scalars
     np.clip(vector[: len(scalars)], -1.0, 1.0, out=vector[: len(scalars)])
@@ -267,8 +272,8 @@ def _state(situation: Situation) -> NDArray[np.float32]:
     table[_ROW["on"]] = memory.is_on
     table[_ROW["goal"]] = memory.wanted
     table[_ROW["found"]] = memory.found
-    np.minimum(memory.did, _OFTEN, out=table[_FIRST_DID:])
-    table[_FIRST_DID:] /= _OFTEN
+    np.minimum(memory.did, OFTEN, out=table[_FIRST_DID:])
+    table[_FIRST_DID:] /= OFTEN
     if last is not None and last.object_type in KIND_OF:
         table[_ROW["last"], KIND_OF[last.object_type]] = 1.0
     if objects.held >= 0:

@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 
 from er_gym.envs.actions import ACTIONS, AnyAction, text_of
 from er_gym.envs.arguments import flag, one_of, short_repr, whole_number
-from er_gym.envs.embodied_env import EmbodiedEnv, verification_env
+from er_gym.envs.embodied_env import verification_env
 from er_gym.envs.errors import ResetNeeded
 from er_gym.envs.sources import EpisodeSource, Source, make_source
 from er_gym.envs.vector.batches import ObservationBatch, batched_infos
+from er_gym.envs.vector.group import Group
+from er_gym.envs.vector.member import MemberEnv, act_ahead
 
 Batch = dict[str, Any]
 """Observations or infos of all environments, by name."""
@@ -77,7 +79,7 @@ class EmbodiedVectorEnv(VectorEnv[Batch, Any, NDArray[Any]]):
         self._source: EpisodeSource = make_source(episode_source, verification_env)
         self.envs: list[gymnasium.Env[Batch, Any]] = []
         for _ in range(self.num_envs):
-            env: gymnasium.Env[Batch, Any] = EmbodiedEnv(self._source, **arguments)
+            env: gymnasium.Env[Batch, Any] = MemberEnv(self._source, **arguments)
             self.envs.append(TimeLimit(env, max_episode_steps) if max_episode_steps else env)
         first = self.envs[0]
         self.metadata = {**first.metadata, "autoreset_mode": self._mode}
@@ -88,6 +90,10 @@ class EmbodiedVectorEnv(VectorEnv[Batch, Any, NDArray[Any]]):
         self.observation_space = batch_space(first.observation_space, self.num_envs)
         self._batch = ObservationBatch(cast(spaces.Dict, first.observation_space), self.num_envs)
         self._over = np.zeros(self.num_envs, dtype=bool)
+        self._group = Group(self.num_envs)
+        for row, env in enumerate(self.envs):
+            if isinstance(env.unwrapped, MemberEnv) and env.unwrapped.can_join:
+                env.unwrapped.join(self._group, row)
 
     # -- Gymnasium's interface -------------------------------------------------------------------
 
@@ -151,6 +157,10 @@ class EmbodiedVectorEnv(VectorEnv[Batch, Any, NDArray[Any]]):
         infos: list[Mapping[str, Any]] = []
         ended: list[int] = []
         final_obs, final_infos = np.full(n, None, dtype=object), []
+        act_ahead(
+            self._group,
+            [(self.envs[row], chosen[row]) for row in range(n) if same_step or not self._over[row]],
+        )
         for row, env in enumerate(self.envs):
             if self._over[row] and not same_step:
                 obs, info = env.reset()
