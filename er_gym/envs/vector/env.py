@@ -21,7 +21,7 @@ from er_gym.envs.errors import ResetNeeded
 from er_gym.envs.sources import EpisodeSource, Source, make_source
 from er_gym.envs.vector.batches import ObservationBatch, batched_infos
 from er_gym.envs.vector.group import Group
-from er_gym.envs.vector.member import MemberEnv, act_ahead
+from er_gym.envs.vector.member import MemberEnv, act_ahead, can_act_ahead
 
 Batch = dict[str, Any]
 """Observations or infos of all environments, by name."""
@@ -69,20 +69,46 @@ class EmbodiedVectorEnv(VectorEnv[Batch, Any, NDArray[Any]]):
         max_episode_steps: int | None = None,
         **arguments: Any,
     ) -> None:
-        self.num_envs = whole_number("num_envs", num_envs, 1, _MOST)
+        num_envs = whole_number("num_envs", num_envs, 1, _MOST)
         modes = [mode.value for mode in AutoresetMode]
         named = getattr(autoreset_mode, "value", autoreset_mode)
-        self._mode = AutoresetMode(one_of("autoreset_mode", named, modes))
-        self._copy = flag("copy", copy)
+        mode = AutoresetMode(one_of("autoreset_mode", named, modes))
+        copy = flag("copy", copy)
         if max_episode_steps is not None:
             max_episode_steps = whole_number("max_episode_steps", max_episode_steps, 1)
-        self._source: EpisodeSource = make_source(episode_source, verification_env)
-        self.envs: list[gymnasium.Env[Batch, Any]] = []
-        for _ in range(self.num_envs):
-            env: gymnasium.Env[Batch, Any] = MemberEnv(self._source, **arguments)
-            self.envs.append(TimeLimit(env, max_episode_steps) if max_episode_steps else env)
-        first = self.envs[0]
-        self.metadata = {**first.metadata, "autoreset_mode": self._mode}
+        source: EpisodeSource = make_source(episode_source, verification_env)
+        self._close_source = getattr(source, "close", lambda: None)
+        envs: list[gymnasium.Env[Batch, Any]] = []
+        for _ in range(num_envs):
+            env: gymnasium.Env[Batch, Any] = MemberEnv(source, **arguments)
+            envs.append(TimeLimit(env, max_episode_steps) if max_episode_steps else env)
+        self._hold(envs, mode, copy)
+
+    @classmethod
+    def around(
+        cls, envs: Sequence[gymnasium.Env[Batch, Any]], mode: AutoresetMode, copy: bool = True
+    ) -> EmbodiedVectorEnv:
+        """A vector environment of environments that are there already, wrapped or not.
+
+        Those of :class:`~er_gym.envs.vector.member.MemberEnv` step together, if all their wrappers
+        look at them only after a step (:func:`~er_gym.envs.vector.member.can_act_ahead`).
+
+        Args:
+            envs: with the same spaces.
+            mode, copy: see :class:`EmbodiedVectorEnv`.
+        """
+        made = cls.__new__(cls)
+        made._close_source = lambda: None
+        made._hold(envs, mode, copy)
+        return made
+
+    def _hold(
+        self, envs: Sequence[gymnasium.Env[Batch, Any]], mode: AutoresetMode, copy: bool
+    ) -> None:
+        self.envs, self.num_envs = envs, len(envs)
+        self._mode, self._copy = mode, copy
+        first = envs[0]
+        self.metadata = {**first.metadata, "autoreset_mode": mode}
         self.render_mode = first.render_mode
         self.single_action_space = first.action_space
         self.single_observation_space = first.observation_space
@@ -91,9 +117,9 @@ class EmbodiedVectorEnv(VectorEnv[Batch, Any, NDArray[Any]]):
         self._batch = ObservationBatch(cast(spaces.Dict, first.observation_space), self.num_envs)
         self._over = np.zeros(self.num_envs, dtype=bool)
         self._group = Group(self.num_envs)
-        for row, env in enumerate(self.envs):
-            if isinstance(env.unwrapped, MemberEnv) and env.unwrapped.can_join:
-                env.unwrapped.join(self._group, row)
+        for row, env in enumerate(envs):
+            if can_act_ahead(env):
+                cast(MemberEnv, env.unwrapped).join(self._group, row)
 
     # -- Gymnasium's interface -------------------------------------------------------------------
 
@@ -229,9 +255,9 @@ class EmbodiedVectorEnv(VectorEnv[Batch, Any, NDArray[Any]]):
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the environments, and the source if it can be closed."""
-        for env in getattr(self, "envs", ()):
+        for env in self.envs:
             env.close()
-        getattr(getattr(self, "_source", None), "close", lambda: None)()
+        self._close_source()
 
     # -- checks ----------------------------------------------------------------------------------
 

@@ -67,8 +67,12 @@ class MemberEpisode(Episode):
         return super().action_mask() if self.group is None else self.group.masks[self.row].copy()
 
     def _perceive(self, outcome: Outcome) -> None:
-        if self.group is None or not self.group.waits:
+        if self.group is None:
             super()._perceive(outcome)
+            return
+        if not self.group.waits:  # somebody steps this environment alone
+            super()._perceive(outcome)
+            self.group.masks[self.row] = super().action_mask()
             return
         if outcome.views:
             super()._perceive(replace(outcome, perception=None))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
+from gymnasium.wrappers import TimeLimit
 
 from er_gym.envs.actions import AnyAction
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -29,8 +30,7 @@ class MemberEnv(EmbodiedEnv):
 
     @property
     def can_join(self) -> bool:
-        """Whether it can step together with others: not by the rules of the paper's program, whose
-        last step looks at what was seen, nor with a window, which shows each step."""
+        """Whether nothing has to look at each step at once."""
         return self._settings.protocol is DEFAULT and self.render_mode != "human"
 
     @property
@@ -71,6 +71,20 @@ class MemberEnv(EmbodiedEnv):
             assert isinstance(self._episode, MemberEpisode)
             self._episode.join(self._group, self._row)
         return answer
+
+
+def can_act_ahead(env: gymnasium.Env[Any, Any]) -> bool:
+    """Whether an environment can step together with others.
+
+    Its wrappers must look at it only after its step, as Gymnasium's ``TimeLimit`` does, and those
+    that say so by a class attribute, ``looks_after_step = True``. An environment by the rules of
+    the paper's program looks itself, and a window shows each step.
+    """
+    while isinstance(env, gymnasium.Wrapper):
+        if not isinstance(env, TimeLimit) and not getattr(type(env), "looks_after_step", False):
+            return False
+        env = env.env
+    return isinstance(env, MemberEnv) and env.can_join
 
 
 def act_ahead(group: Group, turns: Sequence[tuple[gymnasium.Env[Any, Any], AnyAction]]) -> None:
