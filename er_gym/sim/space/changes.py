@@ -21,25 +21,26 @@ from numpy.typing import NDArray
 from er_gym.sim.space.exemptions import Exemptions
 from er_gym.sim.space.rays import Floats, Targets, crossings
 
-MOST_CHANGES = 24
-"""With more new boxes and moved objects than this, one test of all is quicker."""
+MOST_CHANGES = 5
+"""Where more objects than this have moved or appeared, one test of all is quicker."""
 _KEPT = 1 << 16
 """Effects that are kept in a process, some 0.3 KB each."""
 
 Numbers = NDArray[np.uint16]
-_effects: OrderedDict[Hashable, tuple[Numbers, Numbers]] = OrderedDict()
+_Effect = tuple[Numbers, Numbers]
+_effects: OrderedDict[Hashable, _Effect | None] = OrderedDict()
+"""None for an effect that has been asked for once: most are not asked for again."""
 
 
-def _keep(key: Hashable, effect: tuple[Numbers, Numbers]) -> tuple[Numbers, Numbers]:
+def _keep(key: Hashable, effect: _Effect | None) -> None:
     _effects[key] = effect
     if len(_effects) > _KEPT:
         with suppress(KeyError):  # another thread has just dropped the last
             _effects.popitem(last=False)
-    return effect
 
 
 class Boxes(NamedTuple):
-    """Boxes that hide things: (M, 3) corners in metres, (M,) owners, the number of the first."""
+    """Boxes that hide things: (3, M) corners in metres, (M,) owners, the number of the first."""
 
     low: Floats
     high: Floats
@@ -58,11 +59,12 @@ class Known(NamedTuple):
     removed_boxes: NDArray[np.bool_]
 
 
-class _Moved(NamedTuple):
-    """A moved object: its row, the index of its first point, and the key of what hides it."""
+class _Change(NamedTuple):
+    """One change: the row of its object, the index of its first new box or of its first sample
+    point, and the key of what it hides or of what hides it."""
 
     row: int
-    first_point: int
+    first: int
     key: Hashable
 
 
@@ -75,6 +77,8 @@ class Changes:
         new: the new boxes. old: its own.
         stay: its points. moved: those of the moved objects, where they are now.
         moved_points: (P,) of its points those of the moved objects, None if there are none.
+        hiding: the objects that the new boxes belong to.
+        hidden: the moved objects.
     """
 
     serial: int
@@ -83,8 +87,8 @@ class Changes:
     stay: Known
     moved: Known
     moved_points: NDArray[np.bool_] | None
-    box_keys: Sequence[Hashable]
-    objects: Sequence[_Moved]
+    hiding: Sequence[_Change]
+    hidden: Sequence[_Change]
 
     @staticmethod
     def of(
@@ -96,87 +100,100 @@ class Changes:
         moved_points: NDArray[np.bool_] | None,
     ) -> Changes:
         """With the keys of what is remembered: all that it depends on."""
-        boxes = [
-            (owner, low.tobytes(), high.tobytes())
-            for owner, low, high in zip(new.owner.tolist(), new.low, new.high, strict=True)
-        ]
-        objects = []
+        hiding, hidden = [], []
+        for i in dict.fromkeys(new.owner.tolist()):
+            own = np.flatnonzero(new.owner == i)
+            key = (i, new.low[:, own].tobytes(), new.high[:, own].tobytes())
+            hiding.append(_Change(i, int(own[0]), key))
         points = moved.groups.points
         for i in dict.fromkeys(moved.owner.tolist()):
             own = np.flatnonzero(moved.owner == i)
             first = int(moved.groups.first[own[0]])
             last = int(moved.groups.first[own[-1]] + moved.groups.count[own[-1]])
             there = points[:, first:last].tobytes()
-            objects.append(_Moved(i, first, (i, there, moved.exempt.within[i].tobytes())))
-        return Changes(serial, new, old, stay, moved, moved_points, boxes, objects)
+            hidden.append(_Change(i, first, (i, there, moved.exempt.within[i].tobytes())))
+        return Changes(serial, new, old, stay, moved, moved_points, hiding, hidden)
 
-    def hidden_from(self, eye: Floats) -> tuple[list[Numbers], list[Numbers]]:
+    def hidden_from(self, eye: Floats) -> tuple[list[Numbers], list[Numbers]] | None:
         """Pairs of a sample point and a box on the way to it, in several arrays of each.
 
         Args:
             eye: (3,) metres.
+
+        Returns:
+            None the first time that one of the changes is seen from there.
         """
         at = (self.serial, *eye.tolist())
+        new = [key for each in self.changes if (key := (at, each.key)) not in _effects]
+        if new:
+            for key in new:
+                _keep(key, None)
+            return None
         found = [*self._by_new_boxes(eye, at), *self._of_moved(eye, at)]
         if self._between is not None:
             moved, pairs = self._between
-            point, box = crossings(eye, moved, *_corners(self.new), pairs)
-            found.append(_numbers(point, box + self.new.first))
+            point, box = _hits(eye, moved, self.new, pairs)
+            found.append((point, box + np.uint16(self.new.first)))
         return [point for point, _ in found], [box for _, box in found]
 
-    def _by_new_boxes(self, eye: Floats, at: tuple[float, ...]) -> list[tuple[Numbers, Numbers]]:
+    @cached_property
+    def changes(self) -> Sequence[_Change]:
+        """All of them."""
+        return (*self.hiding, *self.hidden)
+
+    def _by_new_boxes(self, eye: Floats, at: tuple[float, ...]) -> list[_Effect]:
         """What the new boxes hide of the objects that stay."""
-        if not self.box_keys:
-            return []
-        keys = [(at, key) for key in self.box_keys]
-        effects = [_effects.get(key) for key in keys]
+        effects = [_effects.get((at, each.key)) for each in self.hiding]
         unknown = [k for k, effect in enumerate(effects) if effect is None]
         if unknown:
-            low, high = _corners(self.new)
-            point, box = crossings(
-                eye,
-                self.stay.groups,
-                low[:, unknown],
-                high[:, unknown],
-                self._pairs_of_new[:, unknown],
-            )
-            for j, k in enumerate(unknown):
-                effects[k] = _keep(keys[k], _numbers(point[box == j], None))
-        number, found = self.new.first, list[tuple[Numbers, Numbers]]()
-        for k, effect in enumerate(effects):
+            columns = np.flatnonzero(np.isin(self.new.owner, [self.hiding[k].row for k in unknown]))
+            pairs = self._pairs_of_new
+            if len(columns) < len(self.new.owner):
+                pairs = np.zeros_like(pairs)
+                pairs[:, columns] = self._pairs_of_new[:, columns]
+            point, box = _hits(eye, self.stay.groups, self.new, pairs)
+            owners = self.new.owner.take(box)
+            for k in unknown:
+                row, first, key = self.hiding[k]
+                own = slice(None) if len(unknown) == 1 else owners == row
+                effects[k] = point[own], box[own] - np.uint16(first)
+                _keep((at, key), effects[k])
+        found = []
+        for change, effect in zip(self.hiding, effects, strict=True):
             assert effect is not None
-            hidden = effect[0]
-            if self.moved_points is not None and len(hidden):
-                hidden = hidden[~self.moved_points.take(hidden)]
-            if len(hidden):
-                found.append((hidden, np.full(len(hidden), number + k, np.uint16)))
+            point, box = effect
+            if len(point):
+                box = box + np.uint16(self.new.first + change.first)
+                if self.moved_points is not None:
+                    stays = ~self.moved_points.take(point)
+                    point, box = point[stays], box[stays]
+                found.append((point, box))
         return found
 
-    def _of_moved(self, eye: Floats, at: tuple[float, ...]) -> list[tuple[Numbers, Numbers]]:
+    def _of_moved(self, eye: Floats, at: tuple[float, ...]) -> list[_Effect]:
         """What the boxes that stay hide of the moved objects."""
-        if not self.objects:
-            return []
-        keys = [(at, each.key) for each in self.objects]
-        effects = [_effects.get(key) for key in keys]
+        effects = [_effects.get((at, each.key)) for each in self.hidden]
         unknown = [k for k, effect in enumerate(effects) if effect is None]
         if unknown:
-            rows = [self.objects[k].row for k in unknown]
-            some = np.flatnonzero(np.isin(self.moved.owner, rows))
-            point, box = crossings(
-                eye, self.moved.groups.some(some), *_corners(self.old), self._pairs_of_moved[some]
-            )
+            groups, pairs = self.moved.groups, self._pairs_of_moved
+            if len(unknown) < len(effects):
+                rows = [self.hidden[k].row for k in unknown]
+                some = np.flatnonzero(np.isin(self.moved.owner, rows))
+                groups, pairs = groups.some(some), pairs[some]
+            point, box = _hits(eye, groups, self.old, pairs)
             owners = self.moved.point_owner.take(point)
-            for k, row in zip(unknown, rows, strict=True):
-                own = owners == row
-                first = self.objects[k].first_point
-                effects[k] = _keep(keys[k], _numbers(point[own] - first, box[own]))
+            for k in unknown:
+                row, first, key = self.hidden[k]
+                own = slice(None) if len(unknown) == 1 else owners == row
+                effects[k] = point[own] - np.uint16(first), box[own]
+                _keep((at, key), effects[k])
         found = []
-        for thing, effect in zip(self.objects, effects, strict=True):
+        for change, effect in zip(self.hidden, effects, strict=True):
             assert effect is not None
-            points, boxes = effect
-            if len(points):
-                there = ~self.moved.removed_boxes.take(boxes)
-                found.append((points[there] + np.uint16(thing.first_point), boxes[there]))
+            point, box = effect
+            if len(point):
+                there = ~self.moved.removed_boxes.take(box)
+                found.append((point[there] + np.uint16(change.first), box[there]))
         return found
 
     @cached_property
@@ -201,12 +218,8 @@ class Changes:
         return (self.moved.groups, pairs) if pairs.any() else None
 
 
-def _corners(boxes: Boxes) -> tuple[Floats, Floats]:
-    return np.ascontiguousarray(boxes.low.T), np.ascontiguousarray(boxes.high.T)
-
-
-_NO_BOX = np.empty(0, dtype=np.uint16)
-
-
-def _numbers(point: NDArray[np.intp], box: NDArray[np.intp] | None) -> tuple[Numbers, Numbers]:
-    return point.astype(np.uint16), _NO_BOX if box is None else box.astype(np.uint16)
+def _hits(
+    eye: Floats, groups: Targets, boxes: Boxes, pairs: NDArray[np.bool_]
+) -> tuple[Numbers, Numbers]:
+    point, box = crossings(eye, groups, boxes.low, boxes.high, pairs)
+    return point.astype(np.uint16), box.astype(np.uint16)

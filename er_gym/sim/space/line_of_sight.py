@@ -116,8 +116,9 @@ class LinesOfSight:
                 stays &= ~self.moved_points.take(known.blocked_point)
             point, box = known.blocked_point[stays], known.blocking_box[stays]
         eye = camera.astype(np.float32)
-        if self._changes is not None:
-            crossed, by = self._changes.hidden_from(eye)
+        known_changes = None if self._changes is None else self._changes.hidden_from(eye)
+        if known_changes is not None:
+            crossed, by = known_changes
             point, box = np.concatenate([point, *crossed]), np.concatenate([box, *by])
         elif self._tests is not None:
             targets, low, high, number, pairs = self._tests
@@ -162,7 +163,7 @@ class LinesOfSight:
         if base is None:
             return None
         first_new = len(base.box_owner)
-        if len(self.box_owner) - first_new + len(self.moved_objects) > MOST_CHANGES:
+        if len({*self.box_owner[first_new:].tolist(), *self.moved_objects.tolist()}) > MOST_CHANGES:
             return None
         new = slice(first_new, None)
         owner, groups = base._groups
@@ -170,8 +171,8 @@ class LinesOfSight:
         mine = np.flatnonzero(np.isin(own_owner, self.moved_objects))
         return Changes.of(
             base.serial,
-            Boxes(self.box_low[new], self.box_high[new], self.box_owner[new], first_new),
-            Boxes(base.box_low, base.box_high, base.box_owner, 0),
+            Boxes(*_across(self.box_low[new], self.box_high[new]), self.box_owner[new], first_new),
+            Boxes(*base._corners, base.box_owner, 0),
             Known(base.point_owner, owner, groups, base.exempt, base.removed_boxes),
             Known(
                 self.point_owner,
@@ -182,6 +183,11 @@ class LinesOfSight:
             ),
             self.moved_points,
         )
+
+    @cached_property
+    def _corners(self) -> tuple[Floats, Floats]:
+        """(3, M) corners of the boxes, metres."""
+        return _across(self.box_low, self.box_high)
 
     @cached_property
     def _groups(self) -> tuple[NDArray[np.intp], Targets]:
@@ -229,8 +235,7 @@ class LinesOfSight:
         boxes = np.flatnonzero(np.any(pairs, axis=0))
         return (
             groups.some(tested),
-            np.ascontiguousarray(self.box_low[boxes].T),
-            np.ascontiguousarray(self.box_high[boxes].T),
+            *_across(self.box_low[boxes], self.box_high[boxes]),
             boxes.astype(np.uint16),
             pairs[:, boxes],
         )
@@ -284,6 +289,11 @@ class LinesOfSight:
         """The answer to a question about this arrangement, computed once."""
         found: T = get_or_compute(self._answers, question, _ANSWERS_KEPT, compute)
         return found
+
+
+def _across(low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    """(3, M) corners of (M, 3) ones, each in one piece of memory."""
+    return np.ascontiguousarray(low.T), np.ascontiguousarray(high.T)
 
 
 def get_or_compute(
