@@ -63,16 +63,33 @@ _TOGGLE_BURNER = INDEX[Action(verbs.TOGGLE, "StoveBurner")]
 _NO_GOAL = _of_type(verbs.NOWHERE)
 
 
-def _possible(verb: Verb, table: ObjectTable) -> NDArray[np.bool_]:
-    """(N,) bool: the objects that a verb can apply to in their present state, for any hand."""
-    if verb.object_property:
-        able = table.has[verb.object_property] | _ALSO[verb.name][table.kinds]
-    else:
-        able = _TAKES[verb.name][table.kinds]
-    if verb.object_state is None:
-        return able
-    name, value = verb.object_state
-    return np.asarray(able & ((table.has[name] == value) | ~table.has[PROPERTY_OF_STATE[name]]))
+_FLAGS = tuple(dict.fromkeys((*PROPERTY_OF_STATE, *PROPERTY_OF_STATE.values()))) + tuple(
+    verb.object_property for verb in _INTERACTIONS if verb.object_property
+)
+_ROW = {name: row for row, name in enumerate(_FLAGS)}
+_ANY = _FLAGS[0]
+_BY_PROPERTY = np.array([bool(verb.object_property) for verb in _INTERACTIONS])[:, None]
+_BY_STATE = np.array([verb.object_state is not None for verb in _INTERACTIONS])[:, None]
+_PROPERTY = [_ROW[verb.object_property or _ANY] for verb in _INTERACTIONS]
+_STATE, _WANTED = zip(*(verb.object_state or (_ANY, True) for verb in _INTERACTIONS), strict=True)
+_ABLE_TO = [_ROW[PROPERTY_OF_STATE[name]] for name in _STATE]
+_IN_STATE, _AS_WANTED = [_ROW[name] for name in _STATE], np.array(_WANTED)[:, None]
+_BY_TYPE = np.stack(
+    [_ALSO[verb.name] if verb.object_property else _TAKES[verb.name] for verb in _INTERACTIONS]
+)
+
+
+def _possible(table: ObjectTable) -> NDArray[np.bool_]:
+    """(len(INTERACTIONS), N) bool: the objects that each verb can apply to in their present state,
+    for any hand."""
+    flags = np.array([table.has[name] for name in _FLAGS])
+    able = flags[_PROPERTY] & _BY_PROPERTY
+    able |= _BY_TYPE[:, table.kinds]
+    fitting = flags[_IN_STATE] == _AS_WANTED
+    fitting |= ~flags[_ABLE_TO]
+    fitting |= ~_BY_STATE
+    able &= fitting
+    return able
 
 
 def _hand_fits(verb: Verb, table: ObjectTable) -> bool:
@@ -121,15 +138,13 @@ class Affordances:
         """Compute the affordances of a table."""
         within = navigable_within(table.volume, table.face)
         within[_NO_GOAL[table.kinds]] = 0.0
-        possible = np.zeros((len(table), len(_INTERACTIONS)), dtype=bool)
-        for verb in _INTERACTIONS:
-            if _hand_fits(verb, table):
-                possible[:, _NUMBER[verb.name]] = _possible(verb, table)
+        possible = _possible(table)
+        possible[[not _hand_fits(verb, table) for verb in _INTERACTIONS]] = False
         if table.held >= 0:
             within[table.held] = 0.0
         return Affordances(
             within=within,
-            actions=np.where(possible, _INDICES[table.kinds], -1),
+            actions=np.where(possible.T, _INDICES[table.kinds], -1),
             on_burners=_on_burners(table),
         )
 

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from er_gym.sim.initial_state import USED_UP
 from er_gym.sim.lazy_metadata import LazyMetadata
+from er_gym.sim.metadata import inventory
+from er_gym.sim.object_metadata import objects
 from er_gym.sim.scene import PROPERTIES, STATES, Scene
 from er_gym.sim.space.door_boxes import boxes_with_doors
 from er_gym.sim.space.visibility import visible
@@ -151,9 +153,21 @@ def objects_of(event: Any) -> _Seen:
     if isinstance(metadata, LazyMetadata):
         world = metadata.source
         if isinstance(world, World) and world.exists.all():
-            seen = visible(world)
-            return _of_world(world), seen, seen
+            return _of_world_seen(world)
     return _of_entries(metadata)
+
+
+def objects_in(world: World) -> _Seen:
+    """The same for the embedded engine's world as it is now."""
+    if world.exists.all():
+        return _of_world_seen(world)
+    # Something has been sliced, broken or taken away.
+    return _of_entries({"objects": objects(world), "inventoryObjects": inventory(world)})
+
+
+def _of_world_seen(world: World) -> _Seen:
+    seen = visible(world)
+    return _of_world(world), seen, seen
 
 
 def _of_entries(metadata: Mapping[str, Any]) -> _Seen:

@@ -16,7 +16,7 @@ from er_gym.sim.world import World
 
 def random_changes(controller, random, count):
     """Open, close, pick up, put, slice: whatever succeeds of random tries."""
-    world = controller.server._engine.world
+    world = controller.server.engine.world
     for _ in range(count):
         i = int(random.integers(len(world)))
         objects = world.object_ids[i]
@@ -55,7 +55,7 @@ def test_the_difference_from_the_record_gives_what_all_boxes_give(
     with EmbeddedController(scene=scene, headless=True, visibilityDistance=20) as controller:
         if rearranged:
             rearrange(controller, seed=1)
-        world = controller.server._engine.world
+        world = controller.server.engine.world
         assert (world.base is not None) == rearranged
         changed = moved = 0
         for _ in range(25):
@@ -102,7 +102,7 @@ def test_the_kernel_that_leaves_out_what_cannot_be_leaves_out_nothing_else(scene
 
 def test_what_looks_as_recorded_again_is_known_as_such() -> None:
     with EmbeddedController(scene="FloorPlan1", headless=True) as controller:
-        world = controller.server._engine.world
+        world = controller.server.engine.world
         before = lines_of_sight(world)
         fridge = next(world.of_type("Fridge"))
         for _ in range(2):
@@ -117,7 +117,7 @@ def test_what_looks_as_recorded_again_is_known_as_such() -> None:
 
 def test_what_is_cut_up_behind_a_closed_door_is_hidden_and_then_seen() -> None:
     with EmbeddedController(scene="FloorPlan1", headless=True, visibilityDistance=20) as controller:
-        world = controller.server._engine.world
+        world = controller.server.engine.world
         tomato, fridge = (world.object_ids[next(world.of_type(t))] for t in ("Tomato", "Fridge"))
         pose = {"x": -1.0, "z": 1.0, "rotation": 270, "horizon": 30, "standing": True}
         controller.step("TeleportFull", **pose)

@@ -33,7 +33,7 @@ def test_columns_are_those_of_the_metadata(scene: str) -> None:
     with EmbeddedController(scene=scene, headless=True, visibilityDistance=20) as controller:
         held = False
         for _ in range(150):
-            ids = controller.server._engine.world.object_ids
+            ids = controller.server.engine.world.object_ids
             verb = str(random.choice(verbs))
             arguments = {"objectId": str(random.choice(ids)), "forceAction": True}
             event = controller.step(action=verb, **({} if verb == "Pass" else arguments))

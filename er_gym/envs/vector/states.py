@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from er_gym.envs.observations import (
     FEATURES,
     GOAL_VERBS,
-    OFTEN,
     SCALARS,
     Memory,
     Situation,
@@ -118,8 +117,7 @@ def fill_states(
     table[:, _ROW["on"]] = memories.is_on[agents]
     table[:, _ROW["goal"]] = memories.wanted[agents]
     table[:, _ROW["found"]] = memories.found[agents]
-    np.minimum(memories.did[agents], OFTEN, out=table[:, _DID:])
-    table[:, _DID:] /= OFTEN
+    table[:, _DID:] = memories.did[agents]
     for k, situation in enumerate(situations):
         last, objects = situation.memory.last, situation.perception.objects
         if last is not None:
