@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from contextlib import suppress
 from functools import lru_cache, wraps
 from typing import TypeVar
 
 from er_gym.sim.scene import Scene
 from er_gym.sim.scene_objects import SceneObjects
+from er_gym.sim.space.remembering import get_or_compute
 from er_gym.sim.world_cache import ObjectCacheKey
 
 T = TypeVar("T")
@@ -64,14 +64,7 @@ def kept_until_moved(name: str) -> Callable[[OfObject[T]], OfObject[T]]:
         def elsewhere(world: SceneObjects, i: int) -> T:
             if world.types[i] in _DEPEND_ON_OTHERS:
                 return compute(world, i)
-            place = _place(world, i)
-            found = places.get(place)
-            if found is None:
-                found = places[place] = compute(world, i)
-                if len(places) > _PLACES_KEPT:
-                    with suppress(KeyError):  # another thread has just dropped the last
-                        places.popitem(last=False)
-            return found
+            return get_or_compute(places, _place(world, i), _PLACES_KEPT, lambda: compute(world, i))
 
         return kept_value
 
