@@ -88,8 +88,7 @@ def _possible(table: ObjectTable) -> NDArray[np.bool_]:
     fitting = flags[_IN_STATE] == _AS_WANTED
     fitting |= ~flags[_ABLE_TO]
     fitting |= ~_BY_STATE
-    able &= fitting
-    return able
+    return np.asarray(able & fitting)
 
 
 def _hand_fits(verb: Verb, table: ObjectTable) -> bool:

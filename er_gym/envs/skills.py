@@ -78,8 +78,7 @@ def reachable(controller: Any, scene: Hashable) -> Reachable:
         scene: a key: the scene, and whatever else the positions depend on.
     """
     if scene not in _reachable:
-        event = controller.step(action="GetReachablePositions", renderImage=False)
-        _reachable[scene] = Reachable(floor_of(event))
+        _reachable[scene] = Reachable(floor_of(controller))
     return _reachable[scene]
 
 

@@ -15,6 +15,7 @@ from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.sim.object_metadata import writable_objects
 from er_gym.sim.protocol import rgba
 from er_gym.sim.render.view import View
+from er_gym.sim.world import World
 
 import_client()
 
@@ -205,6 +206,11 @@ class EmbeddedController(ai2thor.controller.Controller):  # type: ignore[misc]  
     @last_event.setter
     def last_event(self, event: ai2thor.server.Event | None) -> None:
         self._last_event, self._stale = event, False
+
+    @property
+    def world(self) -> World | None:
+        """The engine's world as it is now, which must not be changed."""
+        return None if self.server is None else self.server.engine.world
 
     @property
     def direct(self) -> Direct | None:

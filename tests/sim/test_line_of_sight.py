@@ -8,9 +8,10 @@ import pytest
 from er_gym.sim.controller import EmbeddedController
 from er_gym.sim.scene import load_scene
 from er_gym.sim.settings import Settings
+from er_gym.sim.space.frustum import in_frustum
 from er_gym.sim.space.line_of_sight_builder import compute_lines_of_sight, lines_of_sight
 from er_gym.sim.space.rays import blocked_by
-from er_gym.sim.space.visibility import in_frustum, visible
+from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
 
 
