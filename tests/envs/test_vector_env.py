@@ -13,6 +13,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from er_gym.envs.actions import ACTIONS
 from er_gym.envs.errors import ResetNeeded
 from er_gym.envs.vector import EmbodiedVectorEnv
+from er_gym.envs.vector.member import MemberEnv, can_act_ahead
+from er_gym.envs.wrappers import KeyActionShaping
 from er_gym.tasks.types import TASK_TYPES
 
 ID = "ER-PickupAndPut-v0"
@@ -233,3 +235,84 @@ def test_an_episode_that_is_over_waits_if_autoreset_is_disabled():
     assert info["_steps"].tolist() == [True, False, True, False]
     assert [*options] == ["reset_mask"]
     assert vector.step(["observe"] * N)[-1]["steps"].tolist() == [2, 3, 2, 3]
+
+
+class Curious(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Looks at the environment before a step."""
+
+    def step(self, action: Any) -> Any:
+        before = self.unwrapped.agent_pose  # type: ignore[attr-defined]
+        obs, reward, terminated, truncated, info = self.env.step(action)
+        after = self.unwrapped.agent_pose  # type: ignore[attr-defined]
+        return obs, reward + (after != before), terminated, truncated, info
+
+
+class Contrary(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Changes the action, and claims not to."""
+
+    looks_after_step = True
+
+    def step(self, action: Any) -> Any:
+        return self.env.step(0)
+
+
+def around(wrap: Any, n: int = 2) -> EmbodiedVectorEnv:
+    envs = [wrap(MemberEnv(obs_mode="state")) for _ in range(n)]
+    return EmbodiedVectorEnv.around(envs, AutoresetMode.NEXT_STEP)
+
+
+def test_a_wrapper_that_looks_before_a_step_sees_what_was_before():
+    vector = around(Curious)
+    vector.reset(seed=0)
+    _, rewards, *_ = vector.step(["move forward", "end"])
+    assert rewards.tolist() == [1.0, 0.0]
+    assert not can_act_ahead(vector.envs[0])
+    assert can_act_ahead(KeyActionShaping(MemberEnv(), 0.9))
+
+
+def test_a_wrapper_that_changes_an_action_is_refused():
+    vector = around(Contrary)
+    vector.reset(seed=0)
+    with pytest.raises(gymnasium.error.Error, match=r"changed the action 2 into 0; .* cannot"):
+        vector.step(np.array([2, 2]))
+
+
+def test_an_environment_can_also_be_stepped_alone():
+    vector, other = around(lambda env: env), made(n=2, episode_source="mini", task_type=None)
+    for each in (vector, other):
+        each.reset(seed=0)
+    for action in ("observe", "move forward"):
+        alone = vector.envs[1].step(action)
+        _, _, _, _, info = other.step(["observe", action])
+        for name in ("action_mask", "navigable_mask", "feedback"):
+            assert_same(alone[-1][name], info[name][1])
+        assert (vector.envs[1].action_masks() == alone[-1]["action_mask"]).all()
+    obs, _, _, _, info = vector.step(["observe", "observe"])
+    assert_same(obs["state"][1], other.step(["observe", "observe"])[0]["state"][1])
+    assert info["steps"].tolist() == [2, 4]
+
+
+def test_an_error_in_one_environment_leaves_the_others_where_they_are(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    vector = made(n=3)
+    vector.reset(seed=0)
+    with monkeypatch.context() as patched:
+        broken = vector.envs[1].unwrapped._episode._handler
+        patched.setattr(broken, "execute", lambda *_: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            vector.step(["observe"] * 3)
+    assert [env.action_masks().sum() > 0 for env in (vector.envs[0], vector.envs[2])] == [True] * 2
+    with pytest.raises(ResetNeeded, match="broken off"):
+        vector.step(["observe"] * 3)
+    _, info = vector.reset(options={"reset_mask": np.array([False, True, False])})
+    assert info["steps"].tolist() == [0, 1, 0]
+    assert vector.step(["move forward"] * 3)[-1]["action"].tolist() == ["move forward"] * 3
+
+
+def test_a_copy_goes_on_like_the_original():
+    vector = made(n=2)
+    vector.reset(seed=0)
+    vector.step(["observe", "move forward"])
+    again = copy.deepcopy(vector)
+    assert_same(*(each.step(["move forward", "observe"]) for each in (vector, again)))
