@@ -139,6 +139,7 @@ def test_observations_are_the_callers_own_if_asked_for(own: bool):
     assert (second["state"] is first["state"]) is not own
     assert np.array_equal(first["state"], before["state"]) is own
     assert np.array_equal(info["action_mask"], masks)
+    assert info["_steps"] is not info["_action"]
 
 
 def test_every_id_has_it_and_it_is_the_default():
@@ -302,6 +303,7 @@ def test_an_error_in_one_environment_leaves_the_others_where_they_are(
         patched.setattr(broken, "execute", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             vector.step(["observe"] * 3)
+    assert vector.envs[0].step("move forward")[-1]["action"] == "move forward"
     assert [env.action_masks().sum() > 0 for env in (vector.envs[0], vector.envs[2])] == [True] * 2
     with pytest.raises(ResetNeeded, match="broken off"):
         vector.step(["observe"] * 3)
