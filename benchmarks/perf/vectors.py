@@ -2,16 +2,17 @@
 
     python -m benchmarks.perf.vectors [--envs 64] [--processes 2] [--obs-mode state] [--json FILE]
 
-Random legal actions, tasks of all types in the training rooms, by the processor's time: a busy
-machine makes all rates smaller, and hardly changes their ratios. The ways take turns. Processes
-are measured by the clock, at the same time, beside one of them alone.
+Random legal actions, tasks of all types in the training rooms. Each way has a process of its own,
+since what a process knows of the rooms serves all its environments. The ways take turns, and are
+measured by the processor's time. Several processes at the same time are measured by the clock,
+beside one of them alone.
 """
 
 from __future__ import annotations
 
 import statistics
-import time
-from collections.abc import Callable
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
 from multiprocessing.connection import Connection
@@ -23,7 +24,7 @@ import gymnasium
 import numpy as np
 
 import er_gym  # noqa: F401  (registers the environments)
-from benchmarks.harness.measuring import in_turns, timed
+from benchmarks.harness.measuring import Spent, in_turns, timed
 from benchmarks.harness.output import json_option, print_table, write_figures
 from er_gym.rollout.processes import CONTEXT, end_processes, start_process
 
@@ -34,8 +35,8 @@ WAYS = ("sync", "vector_entry_point")
 
 @dataclass(frozen=True)
 class Rate:
-    """Steps a second of one way: the median of the rounds, and the median of its ratio to one
-    environment's in the same round."""
+    """Steps a second of one way: the median of the rounds, and the median of its ratios to the
+    first way, round by round."""
 
     name: str
     rate: float
@@ -68,7 +69,7 @@ class Player:
             mask = self._info["action_mask"]
             chosen = (self._random.random(mask.shape) * mask).argmax(axis=-1)
             if self._over:
-                self._seed += 1
+                self._seed, self._over = self._seed + 1, False
                 _, self._info = self._env.reset(seed=self._seed)
                 continue
             _, _, terminated, truncated, self._info = self._env.step(
@@ -77,72 +78,83 @@ class Player:
             # As a vector environment does, a single one begins again with a turn of its own.
             self._over = self._single and (terminated or truncated)
 
-    def rate(self, steps: int) -> float:
-        """Steps in a second of the processor."""
-        return steps / timed(partial(self.play, steps)).processor
+
+class Players:
+    """Processes that play, each in its way.
+
+    Args:
+        ways: the mode and the number of environments of each.
+        arguments: of the environments.
+        warm: steps that each plays first.
+    """
+
+    def __init__(
+        self, ways: Sequence[tuple[str, int]], arguments: dict[str, Any], warm: int
+    ) -> None:
+        self._pipes: list[Connection] = []
+        self._processes = []
+        for way in ways:
+            ours, theirs = CONTEXT.Pipe()
+            self._processes.append(start_process(_serve, theirs, *way, arguments, warm))
+            theirs.close()
+            self._pipes.append(ours)
+            ours.recv()
+
+    def spent(self, places: Sequence[int], steps: int) -> list[Spent]:
+        """What so many steps take, in some of them at the same time."""
+        for place in places:
+            self._pipes[place].send(steps)
+        return [self._pipes[place].recv() for place in places]
+
+    def close(self) -> None:
+        """End the processes."""
+        for pipe in self._pipes:
+            pipe.close()
+        end_processes(self._processes)
 
 
-def in_one_process(n: int, arguments: dict[str, Any], steps: int, rounds: int) -> list[Rate]:
-    """One environment, and n in each way."""
-    players = {"one environment": Player("", 1, arguments)}
-    players |= {f"{n} environments, {way}": Player(way, n, arguments) for way in WAYS}
-    for player in players.values():
-        player.play(3 * steps)
-    found = in_turns(
-        {name: partial(player.rate, steps) for name, player in players.items()}, rounds
-    )
-    ones = found["one environment"]
-    return [_rate(name, rates, ones) for name, rates in found.items()]
+def _serve(pipe: Connection, mode: str, n: int, arguments: dict[str, Any], warm: int) -> None:
+    player = Player(mode, n, arguments)
+    player.play(warm)
+    pipe.send(None)
+    with suppress(EOFError):
+        while True:
+            pipe.send(timed(partial(player.play, pipe.recv())))
+
+
+def measured(
+    n: int, processes: int, arguments: dict[str, Any], steps: int, rounds: int
+) -> list[Rate]:
+    """One environment; n in one process in each way; and several processes of n."""
+    ways = [("", 1), *((way, n) for way in WAYS), *[(WAYS[-1], n)] * (processes - 1)]
+    players = Players(ways, arguments, 3 * steps)
+    last = len(WAYS)  # the place of the first of the processes that play at the same time
+
+    def alone(place: int) -> float:
+        return steps / players.spent([place], steps)[0].processor
+
+    def together(number: int) -> float:
+        spent = players.spent(range(last, last + number), steps)
+        return number * steps / max(each.clock for each in spent)
+
+    names = ["one environment", *(f"{n} environments, {way}" for way in WAYS)]
+    single = {name: partial(alone, place) for place, name in enumerate(names)}
+    several = {
+        f"{number} × {n} environments, by the clock": partial(together, number)
+        for number in ([1, processes] if processes > 1 else [])
+    }
+    try:
+        found = in_turns(single, rounds), in_turns(several, rounds)
+    finally:
+        players.close()
+    return [
+        _rate(name, rates, next(iter(way.values()))) for way in found for name, rates in way.items()
+    ]
 
 
 def _rate(name: str, rates: list[float], ones: list[float]) -> Rate:
     ratio = statistics.median(rate / one for rate, one in zip(rates, ones, strict=True))
     return Rate(name, statistics.median(rates), ratio, tuple(rates))
-
-
-def in_processes(
-    number: int, n: int, arguments: dict[str, Any], steps: int, rounds: int
-) -> list[Rate]:
-    """Some processes of n environments each, at the same time, beside one of them alone."""
-    pipes, processes = [], []
-    try:
-        for _ in range(number):
-            ours, theirs = CONTEXT.Pipe()
-            processes.append(start_process(_serve, theirs, n, arguments, 3 * steps))
-            theirs.close()
-            pipes.append(ours)
-        for pipe in pipes:
-            pipe.recv()
-
-        def together(some: int) -> float:
-            began = time.perf_counter()
-            for pipe in pipes[:some]:
-                pipe.send(steps)
-            for pipe in pipes[:some]:
-                pipe.recv()
-            return some * steps / (time.perf_counter() - began)
-
-        ways: dict[int, Callable[[], float]] = {
-            some: partial(together, some) for some in (1, number)
-        }
-        found = in_turns(ways, rounds)
-    finally:
-        for pipe in pipes:
-            pipe.close()
-        end_processes(processes)
-    return [_rate(f"{some} × {n} environments, clock", found[some], found[1]) for some in found]
-
-
-def _serve(pipe: Connection, n: int, arguments: dict[str, Any], warm: int) -> None:
-    player = Player(WAYS[-1], n, arguments)
-    player.play(warm)
-    pipe.send(None)
-    try:
-        while True:
-            player.play(pipe.recv())
-            pipe.send(None)
-    except EOFError:
-        return
 
 
 @click.command()
@@ -164,9 +176,7 @@ def main(
 ) -> None:
     """Measure, and print one table."""
     arguments = {"obs_mode": obs_mode, "episode_source": source, "task_type": None, **SIZE}
-    figures = in_one_process(envs, arguments, steps, rounds)
-    if processes > 1:
-        figures += in_processes(processes, envs, arguments, steps, rounds)
+    figures = measured(envs, processes, arguments, steps, rounds)
     rows = [
         (each.name, f"{each.rate:.0f}", f"{each.ratio:.2f}", f"{max(each.rounds):.0f}")
         for each in figures
