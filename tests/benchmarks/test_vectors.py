@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from benchmarks.perf.vectors import Player
@@ -15,7 +16,7 @@ def test_a_player_steps_on_after_an_episode(mode: str):
     taken = []
     for _ in range(8):
         player.play(1)
-        taken.append(int(player._info["steps"]))
+        taken.append(int(np.ravel(player._info["steps"])[0]))
     # Placing the agent is the first step; a turn is spent on beginning the next episode.
     assert taken.count(1) <= 4
     assert max(taken) > 1
