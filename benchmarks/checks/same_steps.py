@@ -122,7 +122,8 @@ def play(env: EmbodiedEnv, case: Case, seed: int) -> Played:
         obs, reward, ended, cut, info = env.step(action)
         digest.add((str(action), obs, reward, ended, cut, info, env.details, vars(env.agent_pose)))
         steps, over = steps + 1, ended or cut
-    digest.add(env.objects)
+    # An entry's keys come in the order in which they were first read, if anything read them.
+    digest.add([dict(sorted(entry.items())) for entry in env.objects])
     return Played(steps, digest.text())
 
 

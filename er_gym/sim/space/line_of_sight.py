@@ -19,12 +19,12 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.remembering import get_or_compute
 from er_gym.sim.space.changes import MOST_CHANGES, Boxes, Changes, Known
 from er_gym.sim.space.exemptions import Exemptions
 from er_gym.sim.space.frustum import in_frustum
 from er_gym.sim.space.outlines import Outlines
 from er_gym.sim.space.rays import Targets, blocked_by, crossings
-from er_gym.sim.space.remembering import get_or_compute
 
 _MOST_IN_GROUP = 26
 """Sample points, those of a small object, that are tested against a box together. If the box does

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.remembering import get_or_compute
 from er_gym.sim.scene import load_scene
 from er_gym.sim.settings import Settings
 from er_gym.sim.space.exemptions import Exemptions
 from er_gym.sim.space.line_of_sight import Floats, LinesOfSight, Rectangle
 from er_gym.sim.space.outlines import Outlines
-from er_gym.sim.space.remembering import get_or_compute
 from er_gym.sim.space.solids import solid_of
 from er_gym.sim.space.solids.sample_points import sample_points
 from er_gym.sim.world import World

@@ -7,9 +7,9 @@ from collections.abc import Callable, Hashable
 from functools import lru_cache, wraps
 from typing import TypeVar
 
+from er_gym.sim.remembering import get_or_compute
 from er_gym.sim.scene import Scene
 from er_gym.sim.scene_objects import SceneObjects
-from er_gym.sim.space.remembering import get_or_compute
 from er_gym.sim.world_cache import ObjectCacheKey
 
 T = TypeVar("T")
