@@ -16,8 +16,9 @@ from agents.rl.demonstrations import Demonstrations, demonstrate
 from agents.rl.policy_observation import Obs, PolicyObservation
 from agents.rl.rewards import with_reward
 from er_gym.envs.actions import ACTIONS, INDEX
-from er_gym.envs.embodied_env import EmbodiedEnv, verification_env
+from er_gym.envs.embodied_env import verification_env
 from er_gym.envs.sources import EpisodeSource, TaskList, make_source
+from er_gym.envs.vector.member import MemberEnv
 from er_gym.envs.wrappers import KeyActionShaping
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TaskType, types_named
@@ -37,6 +38,8 @@ class TrainingRules(gymnasium.Wrapper[Any, Any, Any, Any]):
     The step limit is part of the task, and the observation states how near it is. No reward follows
     beyond it, so the value there must be 0.
     """
+
+    looks_after_step = True
 
     def __init__(self, env: gymnasium.Env[Any, Any], success_bonus: float) -> None:
         super().__init__(env)
@@ -58,6 +61,8 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         types: the task types, drawn with equal probability; any type if empty.
         policy_observation: makes the learner's observations.
     """
+
+    looks_after_step = True
 
     def __init__(
         self,
@@ -119,6 +124,7 @@ class AdvisedEnv(gymnasium.Wrapper[Obs, Any, Obs, Any]):
     """Adds the action that the searcher would take to the observation of a :class:`LearningEnv`
     with subtasks: ``advice``, () int64, the index of its action."""
 
+    looks_after_step = True
     env: LearningEnv
 
     def __init__(self, env: LearningEnv) -> None:
@@ -172,7 +178,7 @@ def make_env(
         TaskFileError: the suite has not been built, or its file is damaged. (It is a ValueError.)
     """
     env: gymnasium.Env[Any, Any] = TrainingRules(
-        EmbodiedEnv(
+        MemberEnv(
             (),
             obs_mode=f"{options.obs_mode}+text" if with_text else options.obs_mode,
             width=options.width,

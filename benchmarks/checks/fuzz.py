@@ -77,7 +77,7 @@ class ClientDriver:
     @property
     def world(self) -> World:
         assert self._controller.server is not None
-        return self._controller.server._engine.world  # the fuzz reads the engine behind the client
+        return self._controller.server.engine.world  # the fuzz reads the engine behind the client
 
     def step(self, request: Request) -> Outcome:
         """Do an action, and check that only failed actions raise, and the right error."""

@@ -1,9 +1,13 @@
 """Measures how fast the environment steps, resets and starts, and MiniGrid in the same run.
 
     python -m benchmarks.perf.steps [--seconds 4] [--rounds 3] [--json FILE]
+    python -m benchmarks.perf.steps --against COMMIT [--seconds 4] [--rounds 5]
 
 Random legal actions, over all registered environments. The candidates take turns, round after
 round, and the median of the rounds is printed, so a busy machine slows all alike.
+
+``--against`` compares this checkout, with what is not committed, with another commit: each runs its
+own script in turn, the table has the ratio of each row, and exit code 1 says that one is worse.
 """
 
 from __future__ import annotations
@@ -28,6 +32,8 @@ import numpy as np
 import er_gym  # noqa: F401  (registers the environments)
 from benchmarks.harness.measuring import in_turns
 from benchmarks.harness.output import json_option, print_table, write_figures
+from benchmarks.harness.worktree import Commit
+from benchmarks.perf import against
 from er_gym.tasks.types import TASK_TYPES
 from er_gym.thor import make_controller
 
@@ -231,8 +237,16 @@ def show(figures: list[Measurement]) -> None:
 @click.option("--seconds", default=4.0, show_default=True, type=click.FloatRange(0.01))
 @click.option("--rounds", default=3, show_default=True, type=click.IntRange(1))
 @json_option
-def main(seconds: float, rounds: int, file: Path | None) -> None:
+@click.option("--against", "commit", type=Commit(), help="Compare with this commit.")
+def main(seconds: float, rounds: int, file: Path | None, commit: str | None) -> None:
     """Measure, and print one table."""
+    if commit is not None:
+        if rounds < against.LEAST_ROUNDS:
+            raise click.UsageError(f"--against takes at least --rounds {against.LEAST_ROUNDS}")
+        once = ["--rounds", "1", "--seconds", str(seconds)]
+        compared = against.compare("benchmarks.perf.steps", once, commit, rounds)
+        write_figures(file, [asdict(row) for row in compared])
+        raise SystemExit(against.show(compared, commit))
     figures = step_rates(rounds, seconds)
     figures.append(interactable_poses(rounds))
     figures += fresh_start(rounds) + environment_memory()

@@ -155,6 +155,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     """
 
     metadata: dict[str, Any] = {"render_modes": ["ansi", "human", "rgb_array"], "render_fps": 1}  # noqa: RUF012  (Gymnasium's own)
+    _episode_type = Episode
 
     def __init__(
         self,
@@ -434,7 +435,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._no_episode = _BROKEN_OFF  # until this has succeeded
         self._actions_taken = []
         controller = self._started_controller(task.scene)
-        self._episode = Episode(self._settings, task, controller, self._backend, faults, replies)
+        self._episode = self._episode_type(
+            self._settings, task, controller, self._backend, faults, replies
+        )
         self._outer_limit = replies
         answer = self._episode.begin()
         self._no_episode = ""

@@ -63,16 +63,32 @@ _TOGGLE_BURNER = INDEX[Action(verbs.TOGGLE, "StoveBurner")]
 _NO_GOAL = _of_type(verbs.NOWHERE)
 
 
-def _possible(verb: Verb, table: ObjectTable) -> NDArray[np.bool_]:
-    """(N,) bool: the objects that a verb can apply to in their present state, for any hand."""
-    if verb.object_property:
-        able = table.has[verb.object_property] | _ALSO[verb.name][table.kinds]
-    else:
-        able = _TAKES[verb.name][table.kinds]
-    if verb.object_state is None:
-        return able
-    name, value = verb.object_state
-    return np.asarray(able & ((table.has[name] == value) | ~table.has[PROPERTY_OF_STATE[name]]))
+_FLAGS = tuple(dict.fromkeys((*PROPERTY_OF_STATE, *PROPERTY_OF_STATE.values()))) + tuple(
+    verb.object_property for verb in _INTERACTIONS if verb.object_property
+)
+_ROW = {name: row for row, name in enumerate(_FLAGS)}
+_ANY = _FLAGS[0]
+_BY_PROPERTY = np.array([bool(verb.object_property) for verb in _INTERACTIONS])[:, None]
+_BY_STATE = np.array([verb.object_state is not None for verb in _INTERACTIONS])[:, None]
+_PROPERTY = [_ROW[verb.object_property or _ANY] for verb in _INTERACTIONS]
+_STATE, _WANTED = zip(*(verb.object_state or (_ANY, True) for verb in _INTERACTIONS), strict=True)
+_ABLE_TO = [_ROW[PROPERTY_OF_STATE[name]] for name in _STATE]
+_IN_STATE, _AS_WANTED = [_ROW[name] for name in _STATE], np.array(_WANTED)[:, None]
+_BY_TYPE = np.stack(
+    [_ALSO[verb.name] if verb.object_property else _TAKES[verb.name] for verb in _INTERACTIONS]
+)
+
+
+def _possible(table: ObjectTable) -> NDArray[np.bool_]:
+    """(len(INTERACTIONS), N) bool: the objects that each verb can apply to in their present state,
+    for any hand."""
+    flags = np.array([table.has[name] for name in _FLAGS])
+    able = flags[_PROPERTY] & _BY_PROPERTY
+    able |= _BY_TYPE[:, table.kinds]
+    fitting = flags[_IN_STATE] == _AS_WANTED
+    fitting |= ~flags[_ABLE_TO]
+    fitting |= ~_BY_STATE
+    return np.asarray(able & fitting)
 
 
 def _hand_fits(verb: Verb, table: ObjectTable) -> bool:
@@ -121,15 +137,13 @@ class Affordances:
         """Compute the affordances of a table."""
         within = navigable_within(table.volume, table.face)
         within[_NO_GOAL[table.kinds]] = 0.0
-        possible = np.zeros((len(table), len(_INTERACTIONS)), dtype=bool)
-        for verb in _INTERACTIONS:
-            if _hand_fits(verb, table):
-                possible[:, _NUMBER[verb.name]] = _possible(verb, table)
+        possible = _possible(table)
+        possible[[not _hand_fits(verb, table) for verb in _INTERACTIONS]] = False
         if table.held >= 0:
             within[table.held] = 0.0
         return Affordances(
             within=within,
-            actions=np.where(possible, _INDICES[table.kinds], -1),
+            actions=np.where(possible.T, _INDICES[table.kinds], -1),
             on_burners=_on_burners(table),
         )
 
@@ -190,14 +204,8 @@ def available_objects(perception: Perception, navigated_to: str = "") -> Availab
         table.centre[:, 0] - perception.pose.x, table.centre[:, 2] - perception.pose.z
     )
     plain = visible & (distance < can.within)
-    reach = plain
-    row = table.row.get(navigated_to)
-    if row is not None and table.contents[row]:
-        alike = can.alike.get(row)
-        if alike is None:
-            kinds = type_mask(table.kinds[list(table.contents[row])])
-            alike = can.alike[row] = kinds[table.kinds] & (can.within > 0)
-        reach = plain | (visible & alike)
+    alike = alike_objects(table, navigated_to)
+    reach = plain if alike is None else plain | (visible & alike)
     navigable = plain.nonzero()[0]
     standing, burners = can.on_burners
     return AvailableObjects(
@@ -206,6 +214,20 @@ def available_objects(perception: Perception, navigated_to: str = "") -> Availab
         interactable=navigable if reach is plain else reach.nonzero()[0],
         covered=burners[reach[standing]],
     )
+
+
+def alike_objects(table: ObjectTable, navigated_to: str) -> NDArray[np.bool_] | None:
+    """(N,) bool: the objects of the types that lie in the receptacle last navigated to, without the
+    floor and the held object; None if nothing lies in it."""
+    row = table.row.get(navigated_to)
+    if row is None or not table.contents[row]:
+        return None
+    can = affordances(table)
+    alike = can.alike.get(row)
+    if alike is None:
+        kinds = type_mask(table.kinds[list(table.contents[row])])
+        alike = can.alike[row] = kinds[table.kinds] & (can.within > 0)
+    return alike
 
 
 class KnownTypes:

@@ -30,6 +30,8 @@ def select_for_task(
         verb: what the agent does to the object.
         candidates: rows of objects, in scene order, at least one.
     """
+    if len(candidates) == 1:
+        return candidates[0]
     allowed = {objects.ids[row]: row for row in candidates}
     for object_id in _by_relevance(task, pending, verb):
         if object_id in allowed:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 import string
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache, cached_property, lru_cache
 from math import cos, radians, sin
 from typing import Any
 
@@ -28,7 +28,7 @@ from er_gym.envs.text_space import TextSpace
 from er_gym.plugins import PluginError, Registry, is_dotted
 from er_gym.tasks import verbs
 from er_gym.tasks.task import AgentPose
-from er_gym.thor.objects import KIND_OF, TYPES
+from er_gym.thor.objects import KIND_OF, TYPES, ObjectTable
 
 _DID = tuple(f"did {verb}" for verb in verbs.OBJECT_VERBS)
 FEATURES = (
@@ -84,6 +84,7 @@ STATE_LAYOUT = (*SCALARS, *(f"{feature}:{name}" for feature in FEATURES for name
 """What each entry of the ``state`` vector means, in order: :data:`SCALARS`, then a row of types for
 each of :data:`FEATURES`."""
 _LAST = {verb: SCALARS.index(f"last {verb}") for verb in (*verbs.BARE_VERBS, *verbs.OBJECT_VERBS)}
+_GOAL_VERBS = slice(len(SCALARS) - len(GOAL_VERBS), len(SCALARS))
 _ROW = {feature: row for row, feature in enumerate(FEATURES)}
 _FIRST_DID = _ROW[_DID[0]]
 _OFTEN = 4
@@ -115,7 +116,8 @@ class Memory:
         seen: (T,) bool, the types that the agent has seen.
         is_open, is_on: (T,) bool, whether one was open, or switched on, when last seen.
         found: (T,) float32, the greatest weight of the types in view at each type navigated to.
-        did: (len(OBJECT_VERBS), T) how often the agent did each verb to each type.
+        did: (len(OBJECT_VERBS), T) how often the agent did each verb to each type, as a share of
+            what ``state`` counts up to.
         last: the last action; None at first.
         repeats: how often in a row the last action was done.
     """
@@ -132,19 +134,25 @@ class Memory:
 
     def look(self, perception: Perception, at: int | None = None) -> None:
         """Remember what is visible now; ``at`` is the type last navigated to."""
-        objects, visible = perception.objects, perception.visible
-        self.seen |= perception.visible_types
-        out_of_sight = ~perception.visible_types
-        is_open, is_on = objects.has["isOpen"], objects.has["isToggled"]
-        for remembered, now in ((self.is_open, is_open), (self.is_on, is_on)):
+        objects, visible, seen = perception.objects, perception.visible, perception.visible_types
+        self.seen |= seen
+        out_of_sight = ~seen
+        for remembered, state in ((self.is_open, "isOpen"), (self.is_on, "isToggled")):
             remembered &= out_of_sight
-            remembered[objects.kinds[visible & now]] = True
+            for row, kind in _in_state(objects, state):
+                if visible[row]:
+                    remembered[kind] = True
         if at is not None:
-            weights = self.wanted * perception.visible_types
-            weights[at] = 0.0
-            if objects.held >= 0:
-                weights[objects.kinds[objects.held]] = 0.0
-            self.found[at] = max(self.found[at], weights.max())
+            apart = {at, int(objects.kinds[objects.held]) if objects.held >= 0 else at}
+            weights = [w for kind, w in self._goals if seen[kind] and kind not in apart]
+            if weights:
+                self.found[at] = max(self.found[at], *weights)
+
+    @cached_property
+    def _goals(self) -> list[tuple[int, np.float32]]:
+        """The types with a weight, by number."""
+        kinds = self.wanted.nonzero()[0]
+        return list(zip(kinds.tolist(), self.wanted[kinds], strict=True))
 
     def forget_last(self) -> None:
         """Forget the last action: the next action then does not count as a repetition."""
@@ -156,7 +164,19 @@ class Memory:
         self.last = action
         if success and action.object_type:
             row = verbs.OBJECT_VERBS.index(action.verb)
-            self.did[row, KIND_OF[action.object_type]] += 1
+            kind = KIND_OF[action.object_type]
+            self.did[row, kind] = min(self.did[row, kind] + 1 / _OFTEN, 1.0)
+
+
+def _in_state(objects: ObjectTable, state: str) -> list[tuple[int, int]]:
+    """The row and the type of each object that is in a state; found once for each table."""
+    found = objects.derived.get(state)
+    if not isinstance(found, list):
+        rows = objects.has[state].nonzero()[0]
+        found = objects.derived[state] = list(
+            zip(rows.tolist(), objects.kinds[rows].tolist(), strict=True)
+        )
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,6 +209,21 @@ class Situation:
         return self.perception.annotated if self.annotate else self.perception.frame
 
 
+@cache
+def _named() -> Sequence[tuple[str, re.Pattern[str]]]:
+    """The object types, the longest names first, each with how an instruction names it."""
+    found = []
+    for name in sorted(TYPES, key=len, reverse=True):
+        words = r"[\s-]?".join(re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z]+|\d+", name))
+        found.append((name, re.compile(rf"\b{words}(?:s|es)?\b", re.IGNORECASE)))
+    return found
+
+
+@cache
+def _asked() -> Sequence[re.Pattern[str]]:
+    return [re.compile(rf"\b(?:{words})", re.IGNORECASE) for words in GOAL_VERBS.values()]
+
+
 @lru_cache(maxsize=4096)
 def goal(instruction: str) -> tuple[tuple[float, ...], tuple[tuple[str, float], ...]]:
     """What an instruction asks for, read from its words alone.
@@ -200,18 +235,14 @@ def goal(instruction: str) -> tuple[tuple[float, ...], tuple[tuple[str, float], 
     """
     mentions = []
     taken = np.zeros(len(instruction) + 1, dtype=bool)
-    for name in sorted(TYPES, key=len, reverse=True):
-        words = r"[\s-]?".join(re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z]+|\d+", name))
-        for match in re.finditer(rf"\b{words}(?:s|es)?\b", instruction, re.IGNORECASE):
+    for name, pattern in _named():
+        for match in pattern.finditer(instruction):
             span = slice(*match.span())
             if not taken[span].any():
                 taken[span] = True
                 mentions.append((match.start(), name))
     order = list(dict.fromkeys(name for _, name in sorted(mentions)))
-    asked = tuple(
-        float(bool(re.search(rf"\b(?:{words})", instruction, re.IGNORECASE)))
-        for words in GOAL_VERBS.values()
-    )
+    asked = tuple(float(bool(pattern.search(instruction))) for pattern in _asked())
     return asked, tuple((name, 1.0 / (rank + 1)) for rank, name in enumerate(order))
 
 
@@ -242,20 +273,24 @@ def _relative_pose(situation: Situation) -> tuple[float, ...]:
     )
 
 
-def _state(situation: Situation) -> NDArray[np.float32]:
-    memory, objects = situation.memory, situation.perception.objects
-    last = memory.last
-    scalars = (
+def pose_and_episode(situation: Situation) -> tuple[float, ...]:
+    """The first of :data:`SCALARS`, of the agent and the episode; not clipped yet."""
+    return (
         *_relative_pose(situation),
         situation.steps / situation.max_steps,
         float(situation.success),
-        float(objects.held >= 0),
-        memory.repeats / MAX_REPEATS,
+        float(situation.perception.objects.held >= 0),
+        situation.memory.repeats / MAX_REPEATS,
     )
+
+
+def _state(situation: Situation) -> NDArray[np.float32]:
+    memory, objects = situation.memory, situation.perception.objects
+    last = memory.last
+    scalars = pose_and_episode(situation)
     vector = np.zeros(len(STATE_LAYOUT), dtype=np.float32)
-    vector[: len(scalars)] = scalars
-    np.clip(vector[: len(scalars)], -1.0, 1.0, out=vector[: len(scalars)])
-    vector[len(SCALARS) - len(GOAL_VERBS) : len(SCALARS)] = goal(situation.instruction)[0]
+    vector[: len(scalars)] = [min(max(each, -1.0), 1.0) for each in scalars]
+    vector[_GOAL_VERBS] = goal(situation.instruction)[0]
     if last is not None and last.verb in _LAST:  # the paper's protocol has other verbs and types
         vector[_LAST[last.verb]] = 1.0
     table = vector[len(SCALARS) :].reshape(len(FEATURES), len(TYPES))
@@ -267,8 +302,7 @@ def _state(situation: Situation) -> NDArray[np.float32]:
     table[_ROW["on"]] = memory.is_on
     table[_ROW["goal"]] = memory.wanted
     table[_ROW["found"]] = memory.found
-    np.minimum(memory.did, _OFTEN, out=table[_FIRST_DID:])
-    table[_FIRST_DID:] /= _OFTEN
+    table[_FIRST_DID:] = memory.did
     if last is not None and last.object_type in KIND_OF:
         table[_ROW["last"], KIND_OF[last.object_type]] = 1.0
     if objects.held >= 0:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from er_gym.envs.annotate import annotated
 from er_gym.envs.object_view import ObjectView, views_of_objects
 from er_gym.tasks.task import AgentPose
-from er_gym.thor.objects import TYPES, ObjectTable, objects_of
+from er_gym.thor.calls import Seen, seen_in
+from er_gym.thor.objects import TYPES, ObjectTable
 
 SENSORS: Mapping[str, Mapping[str, bool]] = {
     "frame": {},
@@ -101,17 +102,15 @@ class Perception:
 
 def perceive(event: Any) -> Perception:
     """Read what the agent perceives from an AI2-THOR event."""
-    objects, visible, interactable = objects_of(event)
-    agent = event.metadata["agent"]
-    position = agent["position"]
-    pose = AgentPose(
-        position["x"],
-        position["y"],
-        position["z"],
-        agent["rotation"]["y"],
-        agent["cameraHorizon"],
-        agent["isStanding"],
-    )
+    return perception_of(seen_in(event))
+
+
+def perception_of(seen: Seen) -> Perception:
+    """What the agent perceives, from what AI2-THOR tells."""
+    objects, visible, interactable, (x, y, z), rotation, horizon, standing, event = seen
+    pose = AgentPose(x, y, z, rotation, horizon, standing)
+    if event is None:
+        return Perception(objects, visible, interactable, pose, None)
     boxes, depth = event.instance_detections2D, event.depth_frame
     return Perception(
         objects=objects,

@@ -22,5 +22,6 @@ def _register(task_type: TaskType) -> None:
         gymnasium.register(
             id=task_type.env_id,
             entry_point="er_gym.envs.embodied_env:EmbodiedEnv",
+            vector_entry_point="er_gym.envs.vector:EmbodiedVectorEnv",
             kwargs={"task_type": task_type.name},
         )

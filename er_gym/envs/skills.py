@@ -18,11 +18,12 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.perception import Perception, perceive
+from er_gym.envs.perception import Perception, perception_of
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import BASIN_OF
 from er_gym.tasks.task import AgentPose
 from er_gym.thor import ObjectTable
+from er_gym.thor.calls import Calls, Result, calls_of
 from er_gym.thor.floor import floor_of
 
 FORWARD_STEP = 0.5
@@ -77,8 +78,7 @@ def reachable(controller: Any, scene: Hashable) -> Reachable:
         scene: a key: the scene, and whatever else the positions depend on.
     """
     if scene not in _reachable:
-        event = controller.step(action="GetReachablePositions", renderImage=False)
-        _reachable[scene] = Reachable(floor_of(event))
+        _reachable[scene] = Reachable(floor_of(controller))
     return _reachable[scene]
 
 
@@ -99,22 +99,16 @@ class Outcome:
     views: Mapping[str, Perception] = field(default_factory=dict)
 
 
-def _outcome(event: Any) -> Outcome:
-    metadata = event.metadata
-    return Outcome(perceive(event), metadata["lastActionSuccess"], metadata["errorMessage"])
+def _outcome(calls: Calls, result: Result) -> Outcome:
+    return Outcome(perception_of(calls.seen()), *result)
 
 
 def place(controller: Any, pose: AgentPose, *, force: bool = False) -> Outcome:
     """Teleport the agent to a pose; ``force`` skips AI2-THOR's check for room."""
+    calls = calls_of(controller)
+    position = pose.x, pose.y, pose.z
     return _outcome(
-        controller.step(
-            action="TeleportFull",
-            position={"x": pose.x, "y": pose.y, "z": pose.z},
-            rotation={"x": 0.0, "y": pose.rotation, "z": 0.0},
-            horizon=pose.horizon,
-            standing=pose.standing,
-            forceAction=force,
-        )
+        calls, calls.teleport(position, pose.rotation, pose.horizon, pose.standing, force)
     )
 
 
@@ -185,19 +179,8 @@ def _interactable_poses(
     rotations: Sequence[float],
     horizons: Sequence[float],
 ) -> list[AgentPose]:
-    event = controller.step(
-        action="GetInteractablePoses",
-        objectId=object_id,
-        positions=[{"x": x, "y": y, "z": z} for x, y, z in positions],
-        rotations=list(rotations),
-        horizons=list(horizons),
-        standings=[True],
-        renderImage=False,
-    )
-    return [
-        AgentPose(pose["x"], pose["y"], pose["z"], pose["rotation"], pose["horizon"])
-        for pose in event.metadata["actionReturn"]
-    ]
+    found = calls_of(controller).poses(object_id, positions, rotations, horizons)
+    return [AgentPose(x, y, z, rotation, horizon) for x, y, z, rotation, horizon in found]
 
 
 def _view(position: Position, centre: Position) -> tuple[float, float, float]:
@@ -245,8 +228,11 @@ def _best_view(floor: Reachable, x: float, y: float, z: float) -> AgentPose:
 def observe(controller: Any) -> Outcome:
     """Look right, behind and left, and turn back."""
 
+    calls = calls_of(controller)
+
     def turned() -> Perception:
-        return perceive(controller.step(action="RotateRight", degrees=90))
+        calls.turn_right(90.0)
+        return perception_of(calls.seen())
 
     views = {view: turned() for view in VIEWS}
     return Outcome(turned(), True, views=views)
@@ -254,17 +240,14 @@ def observe(controller: Any) -> Outcome:
 
 def move_forward(controller: Any, grid_size: float) -> Outcome:
     """Walk ahead, up to :data:`FORWARD_STEP` metres, in steps of the grid while there is room."""
-    taken = 0.0
+    calls, taken, problem = calls_of(controller), 0.0, ""
     while taken < FORWARD_STEP - 1e-6:
         step = min(grid_size, FORWARD_STEP - taken)
-        controller.step(action="MoveAhead", moveMagnitude=step, renderImage=False)
-        if not controller.last_event.metadata["lastActionSuccess"]:
+        moved, problem = calls.move_ahead(step)
+        if not moved:
             break
         taken += step
-    problem = "" if taken else controller.last_event.metadata["errorMessage"]
-    if not controller.headless:
-        controller.step(action="Pass")  # to draw the one picture needed
-    return replace(_outcome(controller.last_event), success=taken > 0, problem=problem)
+    return _outcome(calls, (taken > 0, "" if taken else problem))
 
 
 def _part_to_put_into(objects: ObjectTable, row: int) -> str:
@@ -273,13 +256,13 @@ def _part_to_put_into(objects: ObjectTable, row: int) -> str:
     return part if part in objects.row else objects.ids[row]
 
 
-def _put(controller: Any, objects: ObjectTable, row: int) -> Any:
+def _put(calls: Calls, objects: ObjectTable, row: int) -> Result:
     verb = verbs.verb_named(verbs.PUT)
     part = _part_to_put_into(objects, row)
-    return controller.step(action=verb.thor_action, objectId=part, **verb.parameters)
+    return calls.act(verb.thor_action, objectId=part, **verb.parameters)
 
 
-def _toggle(controller: Any, objects: ObjectTable, row: int) -> Any:
+def _toggle(calls: Calls, objects: ObjectTable, row: int) -> Result:
     switch = row
     if objects.type_of(row) == "StoveBurner":
         # AI2-THOR's burners have no switch; the knob whose controlledObjects name one is it.
@@ -288,10 +271,10 @@ def _toggle(controller: Any, objects: ObjectTable, row: int) -> Any:
                 switch = other
     action = "ToggleObjectOff" if objects.has["isToggled"][switch] else "ToggleObjectOn"
     # The agent must see the burner, not its knob.
-    return controller.step(action=action, objectId=objects.ids[switch], forceAction=switch != row)
+    return calls.act(action, objectId=objects.ids[switch], forceAction=switch != row)
 
 
-_OTHERWISE: Mapping[str, Callable[[Any, ObjectTable, int], Any]] = {
+_OTHERWISE: Mapping[str, Callable[[Calls, ObjectTable, int], Result]] = {
     verbs.PUT: _put,
     verbs.TOGGLE: _toggle,
 }
@@ -300,15 +283,16 @@ _OTHERWISE: Mapping[str, Callable[[Any, ObjectTable, int], Any]] = {
 
 def interact(controller: Any, name: str, objects: ObjectTable, row: int) -> Outcome:
     """Do an interaction, such as "open", to an object."""
+    calls = calls_of(controller)
     if name in _OTHERWISE:
-        return _outcome(_OTHERWISE[name](controller, objects, row))
+        return _outcome(calls, _OTHERWISE[name](calls, objects, row))
     verb = verbs.verb_named(name)
     return _outcome(
-        controller.step(action=verb.thor_action, objectId=objects.ids[row], **verb.parameters)
+        calls, calls.act(verb.thor_action, objectId=objects.ids[row], **verb.parameters)
     )
 
 
 def act_without_object(controller: Any, name: str) -> Outcome:
     """Do a verb that takes no object, by its AI2-THOR action."""
-    verb = verbs.verb_named(name)
-    return _outcome(controller.step(action=verb.thor_action, **verb.parameters))
+    calls, verb = calls_of(controller), verbs.verb_named(name)
+    return _outcome(calls, calls.act(verb.thor_action, **verb.parameters))

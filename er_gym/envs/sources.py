@@ -15,7 +15,7 @@ import numpy as np
 from er_gym.envs.arguments import short_repr
 from er_gym.tasks.errors import TaskFileError, describe_substitutions, summarise_set_aside
 from er_gym.tasks.resolve import resolve_tasks
-from er_gym.tasks.suites import load_suite, suite_file, suite_from_file, suite_names
+from er_gym.tasks.suites import load_suite, own_tasks, suite_file, suite_from_file, suite_names
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import TaskType
 
@@ -154,6 +154,8 @@ def make_source(source: Source, make_env: Callable[[], PlayableEnv]) -> EpisodeS
 @lru_cache(maxsize=16)
 def _read(name: str, is_file: bool, changed: int) -> tuple[TaskList, str]:
     """The tasks of a suite or file, cached until it changes; and remarks for a warning."""
+    if not is_file and name in suite_names():
+        return TaskList(own_tasks(name), f"the suite {name}"), ""
     suite = suite_from_file(name) if is_file else load_suite(name)
     if not is_file:
         return TaskList(suite.tasks, f"the suite {suite.name}"), ""

@@ -8,12 +8,14 @@ from numpy.typing import NDArray
 
 from er_gym.sim.client_import import import_client
 from er_gym.sim.copy_on_read import CopyOnReadDict
+from er_gym.sim.direct import Direct
 from er_gym.sim.engine import Engine
 from er_gym.sim.errors import CLIENT_ERRORS
 from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.sim.object_metadata import writable_objects
 from er_gym.sim.protocol import rgba
 from er_gym.sim.render.view import View
+from er_gym.sim.world import World
 
 import_client()
 
@@ -75,7 +77,7 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
 
     def __init__(self, width: int, height: int, **kwargs: Any) -> None:
         super().__init__(width, height, **kwargs)
-        self._engine = Engine(width, height, EventMetadata)
+        self.engine = Engine(width, height, EventMetadata)
         self._event: ai2thor.server.Event | None = None
         # The client adjusts the resolution only if it believes that a player process is there.
         self.unity_proc = self
@@ -94,7 +96,7 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
         if action.get("action") == "Reset":
             # The client drops this event in favour of that of the Initialize which it sends next.
             action = {**action, "renderImage": False}
-        metadata, frames = self._engine.step(action)
+        metadata, frames = self.engine.step(action)
         event = EmbeddedEvent(metadata)
         if frames is not None:
             self._attach(event, frames)
@@ -156,6 +158,8 @@ class EmbeddedController(ai2thor.controller.Controller):  # type: ignore[misc]  
         super().__init__(server_class=EmbeddedServer, start_unity=False, **arguments)
 
     server: EmbeddedServer | None
+    _last_event: ai2thor.server.Event | None = None
+    _stale = False
 
     def step(
         self, action: str | dict[str, Any] | None = None, **arguments: Any
@@ -189,6 +193,35 @@ class EmbeddedController(ai2thor.controller.Controller):  # type: ignore[misc]  
             if raise_for_failure:
                 raise RuntimeError(message)
         return event
+
+    @property
+    def last_event(self) -> ai2thor.server.Event | None:
+        """The event of the last action; after :attr:`direct` calls, of the world as it is now."""
+        if self._stale:
+            assert self.server is not None
+            self.server.send({"action": "Pass", "renderImage": False})
+            self.last_event = self.server.receive()
+        return self._last_event
+
+    @last_event.setter
+    def last_event(self, event: ai2thor.server.Event | None) -> None:
+        self._last_event, self._stale = event, False
+
+    @property
+    def world(self) -> World | None:
+        """The engine's world as it is now, which must not be changed."""
+        return None if self.server is None else self.server.engine.world
+
+    @property
+    def direct(self) -> Direct | None:
+        """The engine without the client, for actions that need no event; None while pictures are
+        drawn, since these come with events."""
+        if not self.headless or self.server is None:
+            return None
+        return Direct(self.server.engine, self._let_go)
+
+    def _let_go(self) -> None:
+        self._last_event, self._stale = None, True
 
     def _build_server(self, host: str, port: int, width: int, height: int) -> None:
         if self.server is None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import ReferenceType, ref
 
 from er_gym.sim.actions import perform
@@ -16,6 +16,29 @@ from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError, load_scene
 from er_gym.sim.settings import Settings
 from er_gym.sim.size import check_size
 from er_gym.sim.world import World
+
+
+class Answer(NamedTuple):
+    """The answer to an action.
+
+    Attributes:
+        error: why it failed, ``""`` if it succeeded.
+        code: AI2-THOR's ``errorCode``.
+        reply: its ``actionReturn``.
+    """
+
+    error: str = ""
+    code: str | None = None
+    reply: Any = None
+
+
+def _answer(act: Callable[[], Any]) -> Answer:
+    try:
+        return Answer(reply=act())
+    except ActionFailed as failure:
+        return Answer(str(failure), failure.code, failure.reply)
+    except WrongCall as failure:
+        return Answer(str(failure), failure.code)
 
 
 class Engine:
@@ -50,25 +73,24 @@ class Engine:
             The metadata, and the images unless ``renderImage`` is False.
         """
         name = str(request.get("action"))
-        last = None if self._last is None else self._last()
-        if last is not None and name != "Reset":  # Reset makes a new world
-            last.settle()  # its reader wants the state before this action
-        reply, error, code = None, "", None
-        try:
-            if name == "Reset":
-                self._reset(request)
-            else:
-                reply = perform(self.world, request)
-        except (ActionFailed, WrongCall) as failure:
-            error, code = str(failure), failure.code
-            reply = failure.reply if isinstance(failure, ActionFailed) else None
+        if name == "Reset":  # it makes a new world, so the last metadata need not be settled
+            answer = _answer(lambda: self._reset(request))
+        else:
+            answer = self.do(lambda world: perform(world, request))
         settings = self.world.settings
         self.world.settings = with_flags(settings, request)
-        report = metadata(self.world, name, error, code, reply, self._kind)
+        report = metadata(self.world, name, *answer, self._kind)
         self._last = ref(report)
         frames = draw(self.world) if request.get("renderImage", True) else None
         self.world.settings = settings
         return report, frames
+
+    def do(self, act: Callable[[World], Any]) -> Answer:
+        """Do something to the world, without metadata and images; what it raises is answered."""
+        last = None if self._last is None else self._last()
+        if last is not None:
+            last.settle()  # its reader wants the state before this action
+        return _answer(lambda: act(self.world))
 
     def _reset(self, request: Mapping[str, Any]) -> None:
         name = request.get("sceneName") or self.world.scene.name  # by default the same scene again

@@ -82,7 +82,8 @@ def _third_party_cameras(world: World) -> list[dict[str, Any]]:
     ]
 
 
-def _inventory(world: World) -> list[dict[str, str]]:
+def inventory(world: World) -> list[dict[str, str]]:
+    """The object in the agent's hand."""
     if world.held < 0:
         return []
     return [{"objectId": world.object_ids[world.held], "objectType": world.types[world.held]}]
@@ -94,7 +95,7 @@ _LATER: dict[str, Callable[[World], Any]] = {
     "heldObjectPose": _held_pose,
     "cameraPosition": lambda world: vector(world.agent.camera),
     "thirdPartyCameras": _third_party_cameras,
-    "inventoryObjects": _inventory,
+    "inventoryObjects": inventory,
     "sceneBounds": scene_bounds,
 }
 """Values that are computed when they are read."""

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from er_gym.sim.remembering import get_or_compute
+
+_KEPT = 1024
+"""Nestings that are kept in a process, some 15 KB each."""
+_known: OrderedDict[Any, Nesting] = OrderedDict()
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +33,15 @@ class Nesting:
 
     @staticmethod
     def of(parents: Sequence[Sequence[int]], exists: NDArray[np.bool_]) -> Nesting:
-        """The nesting for each object's receptacles. Objects that do not exist are in none."""
+        """The nesting for each object's receptacles. Objects that do not exist are in none.
+
+        Worlds share it, so it must not be changed.
+        """
+        key = tuple(map(tuple, parents)), exists.tobytes()
+        return get_or_compute(_known, key, _KEPT, lambda: Nesting._of(parents, exists))
+
+    @staticmethod
+    def _of(parents: Sequence[Sequence[int]], exists: NDArray[np.bool_]) -> Nesting:
         count = len(parents)
         contents: list[list[int]] = [[] for _ in range(count)]
         there = exists.tolist()

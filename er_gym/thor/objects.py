@@ -7,6 +7,7 @@ need not be made. An event of Unity is read entry by entry.
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
@@ -17,6 +18,9 @@ from numpy.typing import NDArray
 
 from er_gym.sim.initial_state import USED_UP
 from er_gym.sim.lazy_metadata import LazyMetadata
+from er_gym.sim.metadata import inventory
+from er_gym.sim.object_metadata import objects
+from er_gym.sim.remembering import get_or_compute
 from er_gym.sim.scene import PROPERTIES, STATES, Scene
 from er_gym.sim.space.door_boxes import boxes_with_doors
 from er_gym.sim.space.visibility import visible
@@ -67,8 +71,8 @@ class ObjectTable:
         controlled: the rows of the objects that each object controls, as a stove knob controls its
             burner.
         held: the row of the object in the agent's hand, -1 if the hand is empty.
-        derived: a cache of what follows from all attributes except ``centre``. Two tables share it
-            if they differ only in the position of what the agent carries.
+        derived: a cache of what follows from all attributes except ``centre``. Tables share it if
+            they differ only in that.
     """
 
     ids: tuple[str, ...]
@@ -151,9 +155,21 @@ def objects_of(event: Any) -> _Seen:
     if isinstance(metadata, LazyMetadata):
         world = metadata.source
         if isinstance(world, World) and world.exists.all():
-            seen = visible(world)
-            return _of_world(world), seen, seen
+            return _of_world_seen(world)
     return _of_entries(metadata)
+
+
+def objects_in(world: World) -> _Seen:
+    """The same for the embedded engine's world as it is now."""
+    if world.exists.all():
+        return _of_world_seen(world)
+    # Something has been sliced, broken or taken away.
+    return _of_entries({"objects": objects(world), "inventoryObjects": inventory(world)})
+
+
+def _of_world_seen(world: World) -> _Seen:
+    seen = visible(world)
+    return _of_world(world), seen, seen
 
 
 def _of_entries(metadata: Mapping[str, Any]) -> _Seen:
@@ -224,6 +240,9 @@ def _names(world: World) -> _Names:
     return recorded if tuple(world.object_ids) == recorded.ids else _Names.of(world)
 
 
+_DERIVED_KEPT = 1024
+"""What follows from so many tables is kept in a process, some 15 KB each."""
+_derived: OrderedDict[Any, dict[str, object]] = OrderedDict()
 _TABLE: CacheKey[ObjectTable] = CacheKey("object table")
 
 
@@ -242,15 +261,18 @@ def _table(world: World) -> ObjectTable:
     names = _names(world)
     low, high = boxes_with_doors(world)
     flags = np.concatenate([world.properties, world.states[:, _STATE_COLUMNS]], axis=1).T.copy()
+    parents, size = tuple(world.parents), high - low
+    all_but_centre = (names.ids, flags.tobytes(), size.tobytes(), parents, world.held)
     return ObjectTable(
         ids=names.ids,
         row=names.row,
         kinds=names.kinds,
         has=dict(zip((*PROPERTIES, *_STATES), flags, strict=True)),
         centre=(low + high) / 2,
-        size=high - low,
-        parents=tuple(world.parents),
+        size=size,
+        parents=parents,
         contents=world.contents,
         controlled=names.controlled,
         held=world.held,
+        derived=get_or_compute(_derived, all_but_centre, _DERIVED_KEPT, dict),
     )

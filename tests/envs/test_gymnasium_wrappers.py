@@ -115,7 +115,7 @@ def vectors(**arguments: Any) -> VectorEnv[Any, Any, Any]:
 
 
 def pictures() -> VectorEnv[Any, Any, Any]:
-    return gymnasium.make_vec(ID, num_envs=2, obs_mode="rgb", wrappers=[only_rgb], **SMALL)
+    return gymnasium.make_vec(ID, 2, "sync", obs_mode="rgb", wrappers=[only_rgb], **SMALL)
 
 
 def only_rgb(env: Env) -> Env:
@@ -124,7 +124,7 @@ def only_rgb(env: Env) -> Env:
 
 
 def numbers() -> VectorEnv[Any, Any, Any]:
-    return gymnasium.make_vec(ID, num_envs=2, obs_mode="rgb+state", wrappers=[NumbersOnly], **SMALL)
+    return gymnasium.make_vec(ID, 2, "sync", obs_mode="rgb+state", wrappers=[NumbersOnly], **SMALL)
 
 
 VECTOR: dict[str, Callable[[Path], VectorEnv[Any, Any, Any]] | str] = {

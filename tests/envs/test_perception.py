@@ -19,9 +19,11 @@ from er_gym.envs.legality import KnownTypes, available_objects, legal_actions, n
 from er_gym.envs.object_view import object_features
 from er_gym.envs.observations import Memory
 from er_gym.envs.perception import Perception, perceive, type_names
+from er_gym.envs.perception import perception_of as perception_of_seen
 from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import AgentPose
+from er_gym.thor.calls import Seen
 from er_gym.thor.objects import KIND_OF, TYPES
 
 START = AgentPose(0.0, 0.9, 0.0, 0.0)
@@ -294,7 +296,17 @@ def test_columns_and_entries_are_perceived_alike(
 ) -> None:
     task = dataclasses.replace(load_suite("mini").tasks[0], scene=scene)
     env, twin = EmbodiedEnv([task], obs_mode="state", instances="explore"), Twin()
-    monkeypatch.setattr(skills, "perceive", twin.perceive)
+
+    def by_event(seen: Seen) -> Perception:
+        """What was told without an event is what one tells."""
+        ours, direct = twin.perceive(env._controller.last_event), perception_of_seen(seen)
+        assert (direct.visible == ours.visible).all()
+        assert (direct.interactable == ours.interactable).all()
+        assert direct.pose == ours.pose
+        assert direct.objects.ids == ours.objects.ids
+        return ours
+
+    monkeypatch.setattr(skills, "perception_of", by_event)
     infos = list(random_play(env, 60))
     assert {info["verb"] for info in infos} >= {"pickup", "put in", "observe"}
     assert twin.events > 60

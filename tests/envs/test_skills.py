@@ -107,6 +107,7 @@ def test_verbs_are_done_to_the_part_that_takes_them(
         event = controller.last_event
         objects, *_ = objects_of(event)
         sent = []
+        controller.headless = False  # so that each call is a request
         monkeypatch.setattr(controller, "step", lambda **request: (sent.append(request), event)[1])
         row = objects.of_type(object_type)[0]
         skills.interact(controller, verb, objects, row)

@@ -64,7 +64,7 @@ def test_importing_er_gym_does_not_import_the_heavy_client() -> None:
     assert done.stdout.strip() == "False"
 
 
-@pytest.mark.parametrize("mode", ["sync", "async"])
+@pytest.mark.parametrize("mode", ["sync", "async", "vector_entry_point"])
 def test_make_vec(mode: str) -> None:
     vec = gymnasium.make_vec(
         "er_gym:ER-SinglePickup-v0", num_envs=2, vectorization_mode=mode, obs_mode="state"

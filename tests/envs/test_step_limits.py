@@ -80,7 +80,7 @@ def test_a_reply_that_costs_no_step_lowers_what_is_left() -> None:
     env.close()
 
 
-@pytest.mark.parametrize("mode", ["sync", "async"])
+@pytest.mark.parametrize("mode", ["sync", "async", "vector_entry_point"])
 def test_vector_environments_have_one_limit(mode: str) -> None:
     vec = gymnasium.make_vec(
         ID, num_envs=2, vectorization_mode=mode, max_episode_steps=3, obs_mode="text"

@@ -66,7 +66,7 @@ except ValueError as error:
     seen["invalid"] = str(error)
 
 # -- an object of the made-up type is drawn
-world = controller.server._engine.world
+world = controller.server.engine.world
 row = world.object_ids.index(mug["objectId"])
 before = draw(world).rgb.copy()
 drawn = {}

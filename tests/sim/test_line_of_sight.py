@@ -8,15 +8,17 @@ import pytest
 from er_gym.sim.controller import EmbeddedController
 from er_gym.sim.scene import load_scene
 from er_gym.sim.settings import Settings
+from er_gym.sim.space.changes import Changes
+from er_gym.sim.space.frustum import in_frustum
 from er_gym.sim.space.line_of_sight_builder import compute_lines_of_sight, lines_of_sight
 from er_gym.sim.space.rays import blocked_by
-from er_gym.sim.space.visibility import in_frustum, visible
+from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
 
 
 def random_changes(controller, random, count):
     """Open, close, pick up, put, slice: whatever succeeds of random tries."""
-    world = controller.server._engine.world
+    world = controller.server.engine.world
     for _ in range(count):
         i = int(random.integers(len(world)))
         objects = world.object_ids[i]
@@ -55,7 +57,7 @@ def test_the_difference_from_the_record_gives_what_all_boxes_give(
     with EmbeddedController(scene=scene, headless=True, visibilityDistance=20) as controller:
         if rearranged:
             rearrange(controller, seed=1)
-        world = controller.server._engine.world
+        world = controller.server.engine.world
         assert (world.base is not None) == rearranged
         changed = moved = 0
         for _ in range(25):
@@ -102,7 +104,7 @@ def test_the_kernel_that_leaves_out_what_cannot_be_leaves_out_nothing_else(scene
 
 def test_what_looks_as_recorded_again_is_known_as_such() -> None:
     with EmbeddedController(scene="FloorPlan1", headless=True) as controller:
-        world = controller.server._engine.world
+        world = controller.server.engine.world
         before = lines_of_sight(world)
         fridge = next(world.of_type("Fridge"))
         for _ in range(2):
@@ -117,7 +119,7 @@ def test_what_looks_as_recorded_again_is_known_as_such() -> None:
 
 def test_what_is_cut_up_behind_a_closed_door_is_hidden_and_then_seen() -> None:
     with EmbeddedController(scene="FloorPlan1", headless=True, visibilityDistance=20) as controller:
-        world = controller.server._engine.world
+        world = controller.server.engine.world
         tomato, fridge = (world.object_ids[next(world.of_type(t))] for t in ("Tomato", "Fridge"))
         pose = {"x": -1.0, "z": 1.0, "rotation": 270, "horizon": 30, "standing": True}
         controller.step("TeleportFull", **pose)
@@ -146,3 +148,61 @@ def _seen_by_all(world):
     lens = (world.agent.rotation, world.agent.horizon, 90.0, 1.0)
     seen[anew.point_owner[clear[in_frustum(anew.points[clear] - camera, *lens)]]] = True
     return seen
+
+
+def test_changes_that_are_known_from_a_place_give_what_all_boxes_give(monkeypatch) -> None:
+    """Each change is remembered by itself, the second time that it is seen from a place."""
+    known, worked_out = Changes.hidden_from, []
+
+    def noted(self, eye):
+        found = known(self, eye)
+        worked_out.append(found is not None)
+        return found
+
+    monkeypatch.setattr(Changes, "hidden_from", noted)
+    with EmbeddedController(scene="FloorPlan1", headless=True, visibilityDistance=20) as controller:
+        world = controller.server.engine.world
+
+        def do(action, kind):
+            thing = world.object_ids[next(world.of_type(kind))]
+            assert controller.step(action, objectId=thing, forceAction=True)
+
+        poses = [
+            {"x": -1.0, "z": 1.0, "rotation": rotation, "horizon": 30, "standing": True}
+            for rotation in (270, 0)
+        ]
+        for combination in (
+            [("OpenObject", "Fridge")],
+            [("OpenObject", "Fridge"), ("OpenObject", "Microwave")],
+            [("PickupObject", "Apple"), ("OpenObject", "Fridge"), ("PutObject", "Fridge")],
+            [("OpenObject", "Drawer"), ("OpenObject", "Fridge")],
+            [("OpenObject", "Fridge"), ("PickupObject", "Tomato"), ("PutObject", "Fridge")],
+        ) * 2:
+            controller.reset("FloorPlan1")
+            world = controller.server.engine.world
+            for action, kind in combination:
+                controller.step("TeleportFull", **poses[0], forceAction=True)
+                do(action, kind)
+            for pose in poses:
+                controller.step("TeleportFull", **pose, forceAction=True)
+                assert (visible(world) == _seen_by_all(world)).all(), combination
+    assert sum(worked_out) > 2
+    assert not all(worked_out)
+
+
+@pytest.mark.parametrize("scene", ["FloorPlan1", "FloorPlan216"])
+def test_a_picture_needs_only_the_rays_to_what_is_in_it(scene: str) -> None:
+    random = np.random.default_rng(7)
+    with EmbeddedController(scene=scene, headless=True, visibilityDistance=20) as controller:
+        rearrange(controller, seed=2)
+        world = controller.server.engine.world
+        random_changes(controller, random, 12)
+        known, camera = lines_of_sight(world), world.agent.camera
+        whole = known.viewpoint(camera).clear_points
+        for rotation in (0.0, 90.0, 200.0):
+            lens = (rotation, 0.0, 90.0, 16 / 9)
+            inside = in_frustum(known.points[whole] - camera, *lens)
+            assert known.clear_in_view(camera, lens).tolist() == whole[inside].tolist()
+            assert len(known.viewpoint(camera, lens).blocked_point) < len(
+                known.viewpoint(camera).blocked_point
+            )

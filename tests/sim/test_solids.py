@@ -9,11 +9,12 @@ from support import in_one_test
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.settings import Settings
 from er_gym.sim.space.line_of_sight_builder import lines_of_sight
-from er_gym.sim.space.solids import solid_of
+from er_gym.sim.space.solids import Solid, solid_of
 from er_gym.sim.space.solids.box_transforms import trimmed, turned
 from er_gym.sim.space.solids.counter_tops import _largest_rectangle, rectangles
 from er_gym.sim.space.solids.facing import facings
 from er_gym.sim.space.solids.families import parts
+from er_gym.sim.space.solids.sample_points import sample_points
 from er_gym.sim.world import World
 from er_gym.thor import OBJECT_TYPES
 
@@ -206,3 +207,16 @@ def test_what_lies_in_an_open_drawer_can_be_handled(enter, scene):
         for thing in drawer["receptacleObjectIds"]:
             assert room.do("GetInteractablePoses", thing, maxPoses=1), thing
         room.do("CloseObject", drawer["objectId"], forceAction=True)
+
+
+def test_a_thing_at_a_known_place_has_its_known_solid_in_any_world() -> None:
+    def apple_at(x: float, yaw: float = 0.0) -> tuple[Solid, np.ndarray]:
+        world = World.load(load_scene("FloorPlan1"), Settings())
+        apple = next(world.of_type("Apple"))
+        world.set_pose(apple, np.array([x, 1.0, 0.5]), np.array([0.0, yaw, 0.0]))
+        return solid_of(world, apple), sample_points(world, apple)
+
+    first, turned_by = apple_at(0.5), apple_at(0.5, 45.0)
+    assert all(one is other for one, other in zip(first, apple_at(0.5), strict=True))
+    assert first[0].boxes.tolist() != apple_at(0.6)[0].boxes.tolist()
+    assert first[1].tolist() != turned_by[1].tolist()

@@ -15,10 +15,11 @@ from benchmarks.checks.comparisons.reachable import pieces
 from er_gym.sim.agent import Agent
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.settings import Settings
+from er_gym.sim.space.frustum import NEAR_PLANE, in_frustum
 from er_gym.sim.space.outlines import Outlines
 from er_gym.sim.space.rays import blocked_by
 from er_gym.sim.space.solids import Solid
-from er_gym.sim.space.visibility import NEAR_PLANE, in_frustum, visible
+from er_gym.sim.space.visibility import visible
 from er_gym.sim.space.walkable_floor import standing_places
 from er_gym.sim.world import World
 

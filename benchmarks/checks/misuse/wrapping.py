@@ -30,6 +30,8 @@ from er_gym.envs.wrappers import InstructionEmbedding, KeyActionShaping
 # -- wrappers and the registry --------------------------------------------------------------------
 
 _LIMIT = 4
+VECTORS = ("sync", "async", "vector_entry_point")
+"""Gymnasium's ways to make a vector environment."""
 _WRAPPERS: dict[str, Callable[[Any], Any]] = {
     "shaping": lambda env: KeyActionShaping(env, 0.9),
     "instruction": InstructionEmbedding,
@@ -154,19 +156,19 @@ def vectors() -> Iterator[Try]:
     """Vector environments of Gymnasium and Stable-Baselines3."""
     kinds: dict[str, Callable[[], Any]] = {
         mode: partial(gymnasium.make_vec, ENV_ID, 2, vectorization_mode=mode, obs_mode="state")
-        for mode in ("sync", "async")
+        for mode in VECTORS
     }
     kinds |= {kind: partial(_sb3, kind) for kind in ("DummyVecEnv", "SubprocVecEnv")}
     for name, make in kinds.items():
         yield Try(f"{name} plays", partial(_vector_plays, make))
-    for mode in ("sync", "async"):
+    for mode in VECTORS:
         yield Try(f"{mode} tells what its environments tell", partial(_vector_tells, mode))
     asked: dict[str, Callable[[Any], object]] = {
         **{f"get_attr {name}": lambda vec, n=name: vec.get_attr(n) for name in ("task", "objects")},
         "masks": lambda vec: getattr(vec, "env_method", getattr(vec, "call", None))("action_masks"),
         "step": lambda vec: vec.step(np.full(2, OBSERVE)),
     }
-    for name in ("sync", "async", "DummyVecEnv"):  # SubprocVecEnv's workers end at any error
+    for name in (*VECTORS, "DummyVecEnv"):  # SubprocVecEnv's workers end at any error
         for what, ask in asked.items():
             if name == "async" and what == "step":
                 continue  # Gymnasium's own AsyncVectorEnv has no observation to step from

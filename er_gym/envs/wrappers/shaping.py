@@ -39,6 +39,8 @@ class KeyActionShaping(TaskWrapper, RecordConstructorArgs):
     Evaluate in an environment without this wrapper, or with ``scale=0``.
     """
 
+    looks_after_step = True
+
     def __init__(self, env: gymnasium.Env[Any, Any], gamma: float, scale: float = 1.0) -> None:
         """Wrap an environment.
 

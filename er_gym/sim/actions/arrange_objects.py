@@ -24,7 +24,7 @@ _ARRANGEMENTS = 1024
 """Arrangements that are kept in a process, some 0.1 MB each."""
 _arranged: OrderedDict[tuple[object, ...], World] = OrderedDict()
 
-_SAME = 1e-3
+_SAME, _RELATIVE = 1e-3, 1e-5
 """An object whose coordinates and angles change by less has not moved; metres and degrees."""
 
 
@@ -132,14 +132,16 @@ def _set_pose(world: World, i: int, pose: ObjectPose) -> bool:
     if was_held:
         world.held = -1
     turned = np.abs((rotation - world.rotation[i] + 180.0) % 360.0 - 180.0)
-    if (
-        not was_held
-        and np.allclose(position, world.position[i], atol=_SAME)
-        and (turned < _SAME).all()
-    ):
+    if not was_held and _is_close(position, world.position[i]) and (turned < _SAME).all():
         return False
     world.set_pose(i, position, rotation)
     return True
+
+
+def _is_close(one: np.ndarray, other: np.ndarray) -> bool:
+    """What ``numpy.allclose`` says of two (3,) positions: ten times as fast."""
+    pairs = zip(one.tolist(), other.tolist(), strict=True)
+    return all(abs(a - b) <= _SAME + _RELATIVE * abs(b) for a, b in pairs)
 
 
 @action("InitialRandomSpawn")

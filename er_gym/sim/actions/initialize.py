@@ -9,7 +9,7 @@ from er_gym.sim.actions.move import snap_to_grid
 from er_gym.sim.actions.registry import action, quoted
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.size import LARGEST_SIDE, check_size
-from er_gym.sim.space.visibility import NEAR_PLANE
+from er_gym.sim.space.frustum import NEAR_PLANE
 from er_gym.sim.world import World
 
 _FAR_PLANE = 20.0

@@ -13,7 +13,7 @@ from er_gym.sim.actions.rotate_look import LOOK_LIMITS, LOOK_TOLERANCE
 from er_gym.sim.actions.vectors import Vector
 from er_gym.sim.agent import Agent
 from er_gym.sim.errors import ActionFailed
-from er_gym.sim.space.room_bounds import room_bounds
+from er_gym.sim.space.room_bounds import room_corners
 from er_gym.sim.space.walkable_floor import floor_of, standing_places
 from er_gym.sim.world import World
 
@@ -39,6 +39,11 @@ def _step(world: World, magnitude: float | None, heading: float) -> None:
         by = ", ".join(f"{part + 0.0:.4f}" for part in (end - start).round(4).tolist())
         raise ActionFailed(f"{_obstacle(world, end)} is blocking Agent 0 from moving by ({by}).")
     world.place_agent(replace(world.agent, position=end))
+
+
+def step_ahead(world: World, magnitude: float) -> None:
+    """``MoveAhead`` by some metres."""
+    _step(world, magnitude, _HEADINGS["MoveAhead"])
 
 
 def step_end(world: World, size: float, heading: float) -> np.ndarray:
@@ -172,12 +177,13 @@ def _not_too_far_up_or_down(horizon: float) -> None:
         raise ActionFailed(f"Each horizon must be in [{low:g}:{high:g}]. You gave {horizon:g}.")
 
 
-def _in_bounds(world: World, there: np.ndarray) -> None:
-    low, high = room_bounds(world.scene.name)
-    here = world.agent.position
-    inside = (low <= there) & (there <= high)
+def _in_bounds(world: World, there: tuple[float, float, float]) -> None:
+    low, high = room_corners(world.scene.name)
+    if all(a <= at <= b for a, at, b in zip(low, there, high, strict=True)):
+        return
     # Two rooms were published with a start outside their walls; the agent may stay there.
-    if not inside.all() and np.abs(there - here).max() > 1e-3:
+    here = world.agent.position.tolist()
+    if max(abs(at - was) for at, was in zip(there, here, strict=True)) > 1e-3:
         raise ActionFailed(
             f"Teleport position ({there[0]:.6f}, {there[1]:.6f}, {there[2]:.6f}) out of scene "
             "bounds! Ignore this by setting forceAction=true. GetReachablePositions lists where "
@@ -207,38 +213,66 @@ def teleport(
         x, y, z = position.x, position.y, position.z
     if not forceAction:
         _only_yaw(rotation)
-        _not_too_far_up_or_down(agent.horizon if horizon is None else horizon)
-    here = agent.position
-    there = np.array(
-        [here[0] if x is None else x, here[1] if y is None else y, here[2] if z is None else z]
+    here = agent.position.tolist()
+    teleport_to(
+        world,
+        (here[0] if x is None else x, here[1] if y is None else y, here[2] if z is None else z),
+        agent.rotation if rotation is None else rotation.y % 360.0,
+        horizon,
+        agent.standing if standing is None else standing,
+        force=forceAction,
+        moved=any(part is not None for part in (x, y, z)),
     )
-    if np.abs(there).max() > _FARTHEST:
+
+
+def teleport_to(
+    world: World,
+    there: tuple[float, float, float],
+    rotation: float,
+    horizon: float | None,
+    standing: bool,
+    *,
+    force: bool,
+    moved: bool = True,
+) -> None:
+    """What ``TeleportFull`` does, with all values given.
+
+    Args:
+        there: x, y and z, metres.
+        rotation: degrees, 0 to 360.
+        horizon: degrees; None for the present one.
+        force: whether to waive all conditions except that numbers are within bounds.
+        moved: whether the position was given, and is no longer the agent's own.
+    """
+    agent = world.agent
+    x, y, z = there
+    if not force:
+        _not_too_far_up_or_down(agent.horizon if horizon is None else horizon)
+    if max(abs(x), abs(y), abs(z)) > _FARTHEST:
         raise ActionFailed(
-            f"({there[0]:g}, {there[1]:g}, {there[2]:g}) is farther than {_FARTHEST:g} m away, "
-            "beyond every wall."
+            f"({x:g}, {y:g}, {z:g}) is farther than {_FARTHEST:g} m away, beyond every wall."
         )
-    moved = any(part is not None for part in (x, y, z))
-    if moved and not forceAction:
-        _in_bounds(world, there)
-    standing_at = world.standing_height
-    if abs(there[1] - standing_at) > _HEIGHT_TOLERANCE and not forceAction:
-        raise ActionFailed(
-            f"Cannot teleport to height {there[1]:.3f}: on the floor the agent's centre is at "
-            f"{standing_at:.3f}. Consider using forceAction=true to teleport there anyway."
-        )
-    if not forceAction and not floor_of(world.scene.name).contains(there[[0, 2]]):
-        raise ActionFailed(
-            f"Cannot teleport to ({there[0]:.3f}, {there[2]:.3f}): {_obstacle(world, there)} is "
-            "there. GetReachablePositions lists where the agent can stand."
-        )
-    if not forceAction:
-        there[1] = standing_at
+    if not force:
+        if moved:
+            _in_bounds(world, there)
+        standing_at = world.standing_height
+        if abs(y - standing_at) > _HEIGHT_TOLERANCE:
+            raise ActionFailed(
+                f"Cannot teleport to height {y:.3f}: on the floor the agent's centre is at "
+                f"{standing_at:.3f}. Consider using forceAction=true to teleport there anyway."
+            )
+        if not floor_of(world.scene.name).has(x, z):
+            raise ActionFailed(
+                f"Cannot teleport to ({x:.3f}, {z:.3f}): {_obstacle(world, np.array(there))} is "
+                "there. GetReachablePositions lists where the agent can stand."
+            )
+        y = standing_at
     world.place_agent(
         Agent(
-            position=there,
-            rotation=agent.rotation if rotation is None else rotation.y % 360.0,
+            position=np.array([x, y, z]),
+            rotation=rotation,
             # As AI2-THOR reports it. A forced one may be any number.
             horizon=agent.horizon if horizon is None else remainder(horizon, 360.0),
-            standing=agent.standing if standing is None else standing,
+            standing=standing,
         )
     )

@@ -125,6 +125,11 @@ def _is_near(point: Vector) -> bool:
     return max(abs(point.x), abs(point.z)) <= FARTHEST
 
 
+def on_floor(world: World, places: np.ndarray) -> np.ndarray:
+    """Those of (P, 2) x and z where the agent can stand."""
+    return np.asarray(places[floor_of(world.scene.name).contains(places)])
+
+
 @action("GetInteractablePoses")
 def get_interactable_poses(
     world: World,
@@ -151,14 +156,13 @@ def get_interactable_poses(
         if positions is None
         else np.array([(p.x, p.z) for p in positions if _is_near(p)]).reshape(-1, 2)
     )
-    places = places[floor_of(world.scene.name).contains(places)]
     if rotations is None:
         step = world.settings.rotate_step
         rotations = [k * step for k in range(max(1, int(360 // step)))]
     poses = interactable_poses(
         world,
         i,
-        places,
+        on_floor(world, places),
         rotations,
         HORIZONS if horizons is None else horizons,
         (True, False) if standings is None else standings,

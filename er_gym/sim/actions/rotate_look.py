@@ -57,10 +57,14 @@ def _turner(sign: float) -> Callable[..., None]:
 
         All other arguments have no effect: the held object collides with nothing here.
         """
-        by = sign * (world.settings.rotate_step if degrees is None else degrees)
-        world.place_agent(replace(world.agent, rotation=(world.agent.rotation + by) % 360.0))
+        turn(world, sign * (world.settings.rotate_step if degrees is None else degrees))
 
     return rotate
+
+
+def turn(world: World, by: float) -> None:
+    """Turn the agent clockwise by some degrees."""
+    world.place_agent(replace(world.agent, rotation=(world.agent.rotation + by) % 360.0))
 
 
 action("RotateRight")(_turner(1.0))  # clockwise

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.agent import CAMERA_CROUCHING, CAMERA_STANDING, Agent
+from er_gym.sim.space.frustum import in_frustum
 from er_gym.sim.space.line_of_sight_builder import lines_of_sight
 from er_gym.sim.space.outlines import Outlines
 from er_gym.sim.space.solids import solid_of
 from er_gym.sim.space.solids.sample_points import sample_points
-from er_gym.sim.space.visibility import in_frustum, visible
+from er_gym.sim.space.visibility import visible
 from er_gym.sim.world import World
 
 HORIZONS = (-30.0, 0.0, 30.0, 60.0)

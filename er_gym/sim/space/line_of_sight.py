@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import count as counter
@@ -20,6 +19,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.remembering import get_or_compute
+from er_gym.sim.space.changes import MOST_CHANGES, Boxes, Changes, Known
+from er_gym.sim.space.exemptions import Exemptions
+from er_gym.sim.space.frustum import in_frustum
 from er_gym.sim.space.outlines import Outlines
 from er_gym.sim.space.rays import Targets, blocked_by, crossings
 
@@ -28,10 +31,13 @@ _MOST_IN_GROUP = 26
 not reach between the eye and the group, the points are not tested one by one."""
 _VIEWPOINTS_KEPT = 1024
 _ANSWERS_KEPT = 2048
+_VIEWS_KEPT = 512
 
 T = TypeVar("T")
 Floats = NDArray[np.float32]
 
+Lens = tuple[float, float, float, float]
+"""Rotation, horizon and vertical field of view of a camera, degrees; width divided by height."""
 Rectangle = tuple[tuple[float, float], tuple[float, float]]
 """Lower and upper corner, x and z, metres."""
 
@@ -42,7 +48,8 @@ class Viewpoint:
 
     Attributes:
         blocked_point, blocking_box: (H,) pairs of a sample point and a box on the way to it.
-        clear_points: (C,) the sample points of objects in the open that nothing hides.
+        clear_points: (C,) the sample points of objects in the open that nothing hides, and perhaps
+            hidden ones outside of the picture.
     """
 
     blocked_point: NDArray[np.uint16]
@@ -62,10 +69,9 @@ class LinesOfSight:
         first_point, point_count: (N,) index of each object's first point, and their number.
         box_low, box_high: (M, 3) corners of the boxes that hide things, metres.
         box_owner: (M,) the object that each box belongs to.
-        exempt_boxes: (N, M) the boxes that never hide an object: its own, and those of the
-            receptacles that it is in.
+        exempt: which boxes never hide an object: its own, and those of the receptacles that it is
+            in.
         removed_boxes: (M,) the boxes of earlier arrangements that are no longer there.
-        pairs_to_test: (N, M) the boxes that have to be tested for an object's points.
         concealed: (N,) objects that are in something closed, in the hand or out of the scene.
         extent: a rectangle around everything.
         base: the arrangement that this one was made from, None if it was computed as a whole.
@@ -83,9 +89,8 @@ class LinesOfSight:
     box_low: Floats
     box_high: Floats
     box_owner: NDArray[np.intp]
-    exempt_boxes: NDArray[np.bool_]
+    exempt: Exemptions
     removed_boxes: NDArray[np.bool_]
-    pairs_to_test: NDArray[np.bool_]
     concealed: NDArray[np.bool_]
     extent: Rectangle
     base: LinesOfSight | None
@@ -93,33 +98,66 @@ class LinesOfSight:
     moved_objects: NDArray[np.intp]
     moved_outlines: Outlines | None
     serial: int = field(default_factory=counter().__next__)
-    _viewpoints: OrderedDict[tuple[float, ...], Viewpoint] = field(default_factory=OrderedDict)
+    _viewpoints: OrderedDict[Any, Viewpoint] = field(default_factory=OrderedDict)
+    _views: OrderedDict[Any, NDArray[np.bool_]] = field(default_factory=OrderedDict)
     _answers: OrderedDict[Any, Any] = field(default_factory=OrderedDict)
 
     # -- asking ----------------------------------------------------------------------------------
 
-    def viewpoint(self, camera: NDArray[np.float64]) -> Viewpoint:
-        """What blocks the view from a (3,) camera position, metres."""
+    def viewpoint(self, camera: NDArray[np.float64], lens: Lens | None = None) -> Viewpoint:
+        """What blocks the view from a (3,) camera position, metres.
+
+        Args:
+            lens: leave out what is not in this picture; the recorded arrangement, from which all
+                others are made, leaves out nothing.
+        """
+        lens = None if self.base is None else lens
         return get_or_compute(
             self._viewpoints,
-            tuple(camera.tolist()),
+            (*camera.tolist(), lens),
             _VIEWPOINTS_KEPT,
-            lambda: self._look_from(camera),
+            lambda: self._look_from(camera, lens),
         )
 
-    def _look_from(self, camera: NDArray[np.float64]) -> Viewpoint:
+    def clear_in_view(self, camera: NDArray[np.float64], lens: Lens) -> NDArray[np.uint16]:
+        """The sample points in a picture that nothing hides."""
+        clear = self.viewpoint(camera, lens).clear_points
+        return clear[self._in_view(camera, lens).take(clear)]
+
+    def _in_view(self, camera: NDArray[np.float64], lens: Lens) -> NDArray[np.bool_]:
+        """(P,) the points that are inside a picture, whatever hides them."""
+        if self.base is not None and self.points is self.base.points:
+            return self.base._in_view(camera, lens)
+        return get_or_compute(
+            self._views,
+            (*camera.tolist(), lens),
+            _VIEWS_KEPT,
+            # Four times as fast as coordinates in rows.
+            lambda: in_frustum((self.coordinates - camera[:, None]).T, *lens),
+        )
+
+    def _look_from(self, camera: NDArray[np.float64], lens: Lens | None) -> Viewpoint:
         point = box = np.empty(0, dtype=np.uint16)
         if self.base is not None:
-            known = self.base.viewpoint(camera)
+            known = self.base.viewpoint(camera, lens)
             stays = ~self.removed_boxes.take(known.blocking_box)
             if self.moved_points is not None:
                 stays &= ~self.moved_points.take(known.blocked_point)
             point, box = known.blocked_point[stays], known.blocking_box[stays]
-        if self._tests is not None:
+        eye = camera.astype(np.float32)
+        known_changes = None if self._changes is None else self._changes.hidden_from(eye)
+        if known_changes is not None:
+            crossed, by = known_changes
+            point, box = np.concatenate([point, *crossed]), np.concatenate([box, *by])
+        elif self._tests is not None:
             targets, low, high, number, pairs = self._tests
-            crossed, by = crossings(camera.astype(np.float32), targets, low, high, pairs)
-            point = np.concatenate([point, crossed.astype(np.uint16)])
-            box = np.concatenate([box, number.take(by)])
+            if lens is not None:
+                # A group also counts where a point between it and the next group is in view.
+                view = np.logical_or.reduceat(self._in_view(camera, lens), targets.first)
+                pairs = pairs & view[:, None]
+            hit, by_box = crossings(eye, targets, low, high, pairs)
+            point = np.concatenate([point, hit.astype(np.uint16)])
+            box = np.concatenate([box, number.take(by_box)])
         clear = self._in_the_open.copy()
         clear[point] = False
         return Viewpoint(point, box, clear.nonzero()[0].astype(np.uint16))
@@ -134,6 +172,55 @@ class LinesOfSight:
         if self.base is not None and self.points is self.base.points:
             return self.base.coordinates
         return np.ascontiguousarray(self.points.T)
+
+    @cached_property
+    def exempt_boxes(self) -> NDArray[np.bool_]:
+        """(N, M) the boxes that never hide an object."""
+        return self.exempt.of_objects(np.arange(len(self.point_count)), self.box_owner)
+
+    @cached_property
+    def _pairs_to_test(self) -> NDArray[np.bool_]:
+        """(N, M) the boxes that have to be tested for an object's points."""
+        if self.base is None:
+            return ~self.exempt_boxes
+        # An object that stays is tested against new boxes only, one that has moved against all.
+        moved = np.zeros(len(self.point_count), dtype=bool)
+        moved[self.moved_objects] = True
+        is_new = np.arange(len(self.box_owner)) >= len(self.base.box_owner)
+        return ~self.exempt_boxes & np.where(moved[:, None], ~self.removed_boxes, is_new)
+
+    @cached_property
+    def _changes(self) -> Changes | None:
+        """What differs from the base, if that is little."""
+        base = self.base
+        if base is None:
+            return None
+        first_new = len(base.box_owner)
+        if len({*self.box_owner[first_new:].tolist(), *self.moved_objects.tolist()}) > MOST_CHANGES:
+            return None
+        new = slice(first_new, None)
+        owner, groups = base._groups
+        own_owner, own_groups = self._groups
+        mine = np.flatnonzero(np.isin(own_owner, self.moved_objects))
+        return Changes.of(
+            base.serial,
+            Boxes(*_across(self.box_low[new], self.box_high[new]), self.box_owner[new], first_new),
+            Boxes(*base._corners, base.box_owner, 0),
+            Known(base.point_owner, owner, groups, base.exempt, base.removed_boxes),
+            Known(
+                self.point_owner,
+                own_owner[mine],
+                own_groups.some(mine),
+                self.exempt,
+                self.removed_boxes,
+            ),
+            self.moved_points,
+        )
+
+    @cached_property
+    def _corners(self) -> tuple[Floats, Floats]:
+        """(3, M) corners of the boxes, metres."""
+        return _across(self.box_low, self.box_high)
 
     @cached_property
     def _groups(self) -> tuple[NDArray[np.intp], Targets]:
@@ -167,28 +254,21 @@ class LinesOfSight:
     def _tests(
         self,
     ) -> tuple[Targets, Floats, Floats, NDArray[np.uint16], NDArray[np.bool_]] | None:
-        """The groups and the boxes that occur in ``pairs_to_test``; None if there are none.
+        """The groups and the boxes that occur in ``_pairs_to_test``; None if there are none.
 
         Returns:
             The groups; (3, M) lower and upper corners of the boxes; their (M,) numbers; and the
             (K, M) pairs of a group and a box.
         """
         owner, groups = self._groups
-        tested = np.flatnonzero(np.any(self.pairs_to_test, axis=1)[owner])
+        tested = np.flatnonzero(np.any(self._pairs_to_test, axis=1)[owner])
         if not len(tested):
             return None
-        pairs = self.pairs_to_test[owner[tested]]
+        pairs = self._pairs_to_test[owner[tested]]
         boxes = np.flatnonzero(np.any(pairs, axis=0))
         return (
-            Targets(
-                self.coordinates,
-                groups.first[tested],
-                groups.count[tested],
-                groups.low[:, tested],
-                groups.high[:, tested],
-            ),
-            np.ascontiguousarray(self.box_low[boxes].T),
-            np.ascontiguousarray(self.box_high[boxes].T),
+            groups.some(tested),
+            *_across(self.box_low[boxes], self.box_high[boxes]),
             boxes.astype(np.uint16),
             pairs[:, boxes],
         )
@@ -204,7 +284,7 @@ class LinesOfSight:
         # A box that does not reach into the space between eyes and points hides nothing.
         nearest = np.minimum(origins.min(axis=0), points.min(axis=0))
         farthest = np.maximum(origins.max(axis=0), points.max(axis=0))
-        between = ~self.removed_boxes & ~self.exempt_boxes[i]
+        between = ~self.removed_boxes & ~self.exempt.of_objects(np.array([i]), self.box_owner)[0]
         between &= ((self.box_high >= nearest) & (self.box_low <= farthest)).all(axis=1)
         blocked = blocked_by(
             np.repeat(origins, len(points), axis=0),
@@ -244,18 +324,6 @@ class LinesOfSight:
         return found
 
 
-def get_or_compute(
-    memory: OrderedDict[Any, T], question: Any, limit: int, compute: Callable[[], T]
-) -> T:
-    """The remembered answer, or a new one, which is remembered in place of the least used one.
-
-    Several threads may ask at once, so an entry can vanish between two lines.
-    """
-    with suppress(KeyError):
-        known: T = memory[question]
-        memory.move_to_end(question)
-        return known
-    memory[question] = found = compute()
-    if len(memory) > limit:
-        memory.popitem(last=False)
-    return found
+def _across(low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    """(3, M) corners of (M, 3) ones, each in one piece of memory."""
+    return np.ascontiguousarray(low.T), np.ascontiguousarray(high.T)

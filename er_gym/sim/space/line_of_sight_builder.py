@@ -16,12 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.remembering import get_or_compute
 from er_gym.sim.scene import load_scene
 from er_gym.sim.settings import Settings
-from er_gym.sim.space.line_of_sight import Floats, LinesOfSight, Rectangle, get_or_compute
+from er_gym.sim.space.exemptions import Exemptions
+from er_gym.sim.space.line_of_sight import Floats, LinesOfSight, Rectangle
 from er_gym.sim.space.outlines import Outlines
 from er_gym.sim.space.solids import solid_of
-from er_gym.sim.space.solids.sample_points import SEEN_FROM_OUTSIDE, SLABS, sample_points
+from er_gym.sim.space.solids.sample_points import sample_points
 from er_gym.sim.world import World
 from er_gym.sim.world_cache import CacheKey
 
@@ -70,7 +72,6 @@ def compute_lines_of_sight(world: World) -> LinesOfSight:
     count = np.array([len(p) for p in points])
     concealed = _concealed(world)
     low, high, owner = _hiding_boxes(world, np.flatnonzero(~concealed).tolist())
-    exempt = _exempt_boxes(world, owner)
     outlines = Outlines.of([solid_of(world, i) for i in rows])
     return LinesOfSight(
         points=np.concatenate(points).astype(np.float32),
@@ -80,9 +81,8 @@ def compute_lines_of_sight(world: World) -> LinesOfSight:
         box_low=low,
         box_high=high,
         box_owner=owner,
-        exempt_boxes=exempt,
+        exempt=Exemptions.of(world),
         removed_boxes=np.zeros(len(owner), dtype=bool),
-        pairs_to_test=~exempt,
         concealed=concealed,
         extent=_extent(outlines),
         base=None,
@@ -105,24 +105,6 @@ def _hiding_boxes(world: World, rows: Iterable[int]) -> tuple[Floats, Floats, ND
     hiding = [np.empty((0, 2, 3)), *(solid_of(world, i).hiding for i in rows)]
     boxes = np.concatenate(hiding).astype(np.float32)
     return boxes[:, 0], boxes[:, 1], np.repeat(rows, [len(h) for h in hiding[1:]]).astype(np.intp)
-
-
-def _exempt_boxes(world: World, owner: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """(N, M) the boxes that never hide an object.
-
-    These are its own boxes and those of the receptacles that it is in, with three exceptions. The
-    boxes of an object that is seen only from outside do hide its own points. A slab hides what lies
-    on it from below. And the carcass of a counter is hollow where it holds a cabinet or a drawer,
-    so it does not hide their contents.
-    """
-    from_outside = np.isin(world.types, SEEN_FROM_OUTSIDE)
-    mine = (np.arange(len(world))[:, None] == owner) & ~from_outside[:, None]
-    slabs = np.isin(world.types, SLABS)
-    found = mine | (world.nesting.within[:, owner] & ~slabs[owner])
-    in_counter = world.nesting.within[:, list(world.of_type("Cabinet", "Drawer"))].any(axis=1)
-    carcasses = np.isin(world.types, "CounterTop")[owner]
-    found[np.ix_(in_counter, carcasses)] = True
-    return np.asarray(found)
 
 
 def _extent(outlines: Outlines) -> Rectangle:
@@ -206,9 +188,6 @@ def _update(world: World, base: LinesOfSight, difference: _Difference) -> LinesO
     is_new = np.arange(len(owner)) >= len(base.box_owner)
     removed = ~is_new & (moved | concealed)[owner]
     removed[: len(base.removed_boxes)] |= base.removed_boxes
-    exempt = _exempt_boxes(world, owner)
-    # An object that stays is tested against new boxes only, one that has moved against all.
-    pairs = ~exempt & np.where(moved[:, None], ~removed, is_new)
     points = _Points(base.points, base.point_owner, base.first_point, base.point_count)
     if len(rows) or count > old:
         points = _update_points(world, base, rows)
@@ -225,9 +204,8 @@ def _update(world: World, base: LinesOfSight, difference: _Difference) -> LinesO
         box_low=np.concatenate([base.box_low, added[0]]),
         box_high=np.concatenate([base.box_high, added[1]]),
         box_owner=owner,
-        exempt_boxes=exempt,
+        exempt=Exemptions.of(world),
         removed_boxes=removed,
-        pairs_to_test=pairs,
         concealed=concealed,
         extent=extent,
         base=base,

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from er_gym.sim.agent import Agent
 from er_gym.sim.rotation import unity_rotation
 from er_gym.sim.scene import PROPERTIES
+from er_gym.sim.space.frustum import in_frustum
 from er_gym.sim.space.recorded_surfaces import recorded_surfaces
 from er_gym.sim.space.solids import solid_of
 from er_gym.sim.space.solids.families import family
-from er_gym.sim.space.visibility import in_frustum
 from er_gym.sim.world import World, upright_rotation
 
 Floats = NDArray[np.float64]

@@ -65,6 +65,16 @@ class Targets:
     low: Floats
     high: Floats
 
+    def some(self, groups: NDArray[np.intp]) -> Targets:
+        """Some of the groups."""
+        return Targets(
+            self.points,
+            self.first[groups],
+            self.count[groups],
+            self.low[:, groups],
+            self.high[:, groups],
+        )
+
 
 def crossings(
     eye: Floats, targets: Targets, box_min: Floats, box_max: Floats, pairs: NDArray[np.bool_]
@@ -82,13 +92,14 @@ def crossings(
     Returns:
         (H,) points and (H,) boxes, a pair for each line of sight that a box blocks.
     """
-    between = pairs
-    for axis in range(3):
-        nearest = np.minimum(targets.low[axis], eye[axis])
-        farthest = np.maximum(targets.high[axis], eye[axis])
-        between = (
-            between & (box_max[axis] >= nearest[:, None]) & (box_min[axis] <= farthest[:, None])
-        )
+    at = eye[:, None]
+    nearest, farthest = np.minimum(targets.low, at), np.maximum(targets.high, at)
+    overlap = box_max[:, None] >= nearest[:, :, None]
+    overlap &= box_min[:, None] <= farthest[:, :, None]
+    between = overlap[0]
+    between &= overlap[1]
+    between &= overlap[2]
+    between &= pairs
     group, box = between.nonzero()
     if not len(group):
         return group, box
@@ -98,22 +109,14 @@ def crossings(
     point += np.repeat(targets.first[group] - ends + count, count)
     boxes = np.repeat(box, count)
     if len(point) < targets.points.shape[1]:
-        inverse = _inverse(targets.points.take(point, axis=1) - eye[:, None])
+        scale = _inverse(targets.points.take(point, axis=1) - at)
     else:
-        inverse = _inverse(targets.points - eye[:, None]).take(point, axis=1)
-    near, far = box_min - eye[:, None], box_max - eye[:, None]
-    near, far = near.take(boxes, axis=1), far.take(boxes, axis=1)
-    enter, leave = _slab(inverse[0], near[0], far[0])
-    for axis in (1, 2):
-        first, last = _slab(inverse[axis], near[axis], far[axis])
-        np.maximum(enter, first, out=enter)
-        np.minimum(leave, last, out=leave)
-    crossed = (enter > _EPSILON) & (enter <= leave) & (leave < _ALMOST_ONE)
-    return point[crossed], boxes[crossed]
-
-
-def _slab(scale: Floats, near: Floats, far: Floats) -> tuple[Floats, Floats]:
-    """Where lines enter and leave the space between two planes, as fractions of their length."""
+        scale = _inverse(targets.points - at).take(point, axis=1)
+    near, far = (box_min - at).take(boxes, axis=1), (box_max - at).take(boxes, axis=1)
     near *= scale
     far *= scale
-    return np.minimum(near, far), np.maximum(near, far)
+    # Where the lines enter and leave the spaces between planes, as fractions of their length.
+    enter = np.maximum.reduce(np.minimum(near, far))
+    leave = np.minimum.reduce(np.maximum(near, far, out=far))
+    crossed = (enter > _EPSILON) & (enter <= leave) & (leave < _ALMOST_ONE)
+    return point[crossed], boxes[crossed]

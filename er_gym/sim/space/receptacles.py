@@ -38,7 +38,9 @@ def receptacles_of(world: World, i: int) -> tuple[int, ...]:
         if r not in within:
             fit = _fit(world, r, i)
             if fit is not None:
-                area = float(np.prod((world.high[r] - world.low[r])[_FLOOR]))
+                west, _, south = world.low[r].tolist()
+                east, _, north = world.high[r].tolist()
+                area = (east - west) * (north - south)
                 found.append((fit, world.types[r] == "Floor", area, r))
     if not found:
         return ()
@@ -50,35 +52,40 @@ def receptacles_of(world: World, i: int) -> tuple[int, ...]:
 def _fit(world: World, r: int, i: int) -> int | None:
     """How well object i fits in or on receptacle r: 0 well, 1 perhaps, None not at all."""
     kind = world.types[r]
-    low, high = world.low[r], world.high[r]
-    underside, top = world.low[i, 1], world.high[i, 1]
     if kind in _HANGERS:
+        low, high = world.low[r], world.high[r]
         near = (world.low[i] <= high + _SLACK).all() and (world.high[i] >= low - _SLACK).all()
         return 0 if near else None
     if not _over(world, r, i):
         return None
+    bottom, ceiling = float(world.low[r, 1]), float(world.high[r, 1])
+    underside, top = float(world.low[i, 1]), float(world.high[i, 1])
     if kind == "Floor":
-        return 0 if abs(underside - high[1]) <= _SLACK else None
+        return 0 if abs(underside - ceiling) <= _SLACK else None
     stand = family(kind, world.has(r, "pickupable")).stand
-    tall = high[1] - low[1]
+    tall = ceiling - bottom
     if stand is None:
-        ceiling = high[1] + _SLACK
+        most = ceiling + _SLACK
         if kind in _CASES:
-            ceiling = high[1] - _BESIDE if top <= high[1] + _SLACK else -np.inf
+            most = ceiling - _BESIDE if top <= ceiling + _SLACK else -np.inf
         elif kind == "Shelf":
             # A shelf is a board and the air above it, up to the next shelf's board.
-            ceiling = low[1] + max(_SLACK, tall / 2)
-        return 0 if low[1] - _SLACK <= underside <= ceiling else None
-    if abs(underside - (low[1] + stand * tall)) <= _SLACK:
+            most = bottom + max(_SLACK, tall / 2)
+        return 0 if bottom - _SLACK <= underside <= most else None
+    if abs(underside - (bottom + stand * tall)) <= _SLACK:
         return 0
-    return 1 if low[1] + _LOW * tall <= underside <= high[1] + _SLACK else None
+    return 1 if bottom + _LOW * tall <= underside <= ceiling + _SLACK else None
 
 
 def _over(world: World, r: int, i: int) -> bool:
     """Whether the middle of object i is over receptacle r. A counter may be bent."""
-    middle = ((world.low[i] + world.high[i]) / 2)[_FLOOR]
+    (x, _, z), (to_x, _, to_z) = world.low[i].tolist(), world.high[i].tolist()
+    x, z = (x + to_x) / 2, (z + to_z) / 2
     if world.types[r] == "CounterTop":
-        low, high = solid_of(world, r).boxes[:, :, _FLOOR].swapaxes(0, 1)
+        boxes = solid_of(world, r).boxes.tolist()
     else:
-        low, high = world.low[None, r, _FLOOR], world.high[None, r, _FLOOR]
-    return bool(((low - _BESIDE <= middle) & (middle <= high + _BESIDE)).all(axis=1).any())
+        boxes = [(world.low[r].tolist(), world.high[r].tolist())]
+    return any(
+        low[0] - _BESIDE <= x <= high[0] + _BESIDE and low[2] - _BESIDE <= z <= high[2] + _BESIDE
+        for low, high in boxes
+    )

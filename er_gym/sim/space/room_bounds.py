@@ -44,6 +44,13 @@ def room_bounds(scene_name: str) -> tuple[NDArray[np.float64], NDArray[np.float6
     return estimate_bounds(load_scene(scene_name), Slacks())
 
 
+@lru_cache(maxsize=128)
+def room_corners(scene_name: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """The same as plain numbers, for what is asked at every step."""
+    low, high = room_bounds(scene_name)
+    return tuple(low.tolist()), tuple(high.tolist())
+
+
 def estimate_bounds(
     scene: Scene, slacks: Slacks
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -16,42 +16,6 @@ from er_gym.sim.space.line_of_sight import LinesOfSight
 from er_gym.sim.space.line_of_sight_builder import lines_of_sight
 from er_gym.sim.world import World
 
-NEAR_PLANE = 0.1
-"""Distance of the camera's near plane, metres."""
-
-
-def in_frustum(
-    offsets: NDArray[np.float64],
-    rotation: NDArray[np.float64] | float,
-    horizon: NDArray[np.float64] | float,
-    field_of_view: float,
-    aspect: float,
-) -> NDArray[np.bool_]:
-    """Which points are in a camera's picture.
-
-    Args:
-        offsets: (..., 3) from the camera to the points, metres, world frame.
-        rotation, horizon: degrees, broadcast against the points.
-        field_of_view: vertical, degrees.
-        aspect: width of the picture divided by its height.
-    """
-    yaw, pitch = np.radians(rotation), np.radians(horizon)
-    x, y, z = offsets[..., 0], offsets[..., 1], offsets[..., 2]
-    sin_yaw, cos_yaw, sin_pitch, cos_pitch = np.sin(yaw), np.cos(yaw), np.sin(pitch), np.cos(pitch)
-    # Computing in place takes half the time.
-    right, ahead = x * cos_yaw, x * sin_yaw
-    right -= z * sin_yaw
-    ahead += z * cos_yaw
-    forward, up = ahead * cos_pitch, ahead * sin_pitch
-    forward -= y * sin_pitch
-    up += y * cos_pitch
-    found = forward > NEAR_PLANE
-    forward *= np.tan(np.radians(field_of_view) / 2)
-    found &= np.abs(up, out=up) <= forward
-    forward *= aspect
-    found &= np.abs(right, out=right) <= forward
-    return np.asarray(found)
-
 
 def visible(world: World, agent: Agent | None = None) -> NDArray[np.bool_]:
     """(N,) whether the agent sees each object, from its pose or from another one."""
@@ -74,18 +38,13 @@ def visible(world: World, agent: Agent | None = None) -> NDArray[np.bool_]:
 
 
 def _look(known: LinesOfSight, agent: Agent, settings: Settings) -> NDArray[np.bool_]:
-    camera = agent.camera
-    clear = known.viewpoint(camera).clear_points
-    seen = in_frustum(
-        (
-            known.coordinates.take(clear, axis=1) - camera[:, None]
-        ).T,  # four times as fast as indexing
+    lens = (
         agent.rotation,
         agent.horizon,
         settings.field_of_view,
         settings.width / settings.height,
     )
     found = np.zeros(len(known.point_count), dtype=bool)
-    found[known.point_owner[clear[seen]]] = True
+    found[known.point_owner[known.clear_in_view(agent.camera, lens)]] = True
     near = known.within_distance(agent.position, settings.visibility_distance)
     return found if near is None else found & near

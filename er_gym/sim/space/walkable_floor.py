@@ -10,7 +10,7 @@ docs/fidelity.md compares the result with AI2-THOR's.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -63,6 +63,10 @@ class Floor:
     def contains(self, points: NDArray[np.float64]) -> Bitmap:
         """Whether the agent can stand on each of (..., 2) x, z points, to within 1.3 cm."""
         return self._look_up(self.free, points)
+
+    def has(self, x: float, z: float) -> bool:
+        """Whether the agent can stand on one point: ten times as fast, for what every step asks."""
+        return self._at(self.free, x, z)
 
     def is_certain(self, points: NDArray[np.float64]) -> Bitmap:
         """Whether each of (..., 2) x, z points is on floor that the record proves."""
@@ -120,14 +124,23 @@ class Floor:
 
     def _look_up(self, bitmap: Bitmap, points: NDArray[np.float64]) -> Bitmap:
         wide, deep = bitmap.shape
-        if points.ndim == 1:  # a single point, as at every step: ten times as fast
-            (x, z), (west, south) = points.tolist(), self.origin.tolist()
-            column = min(max(round((x - west) / CELL), 0), wide - 1)
-            row = min(max(round((z - south) / CELL), 0), deep - 1)
-            return np.asarray(bitmap[column, row])
+        if points.ndim == 1:
+            return np.asarray(self._at(bitmap, *points.tolist()))
         cells = np.clip(np.round((points - self.origin) / CELL), 0.0, (wide - 1, deep - 1))
         columns, rows = np.moveaxis(cells.astype(int), -1, 0)
         return np.asarray(bitmap[columns, rows])
+
+    def _at(self, bitmap: Bitmap, x: float, z: float) -> bool:
+        wide, deep = bitmap.shape
+        west, south = self._corner
+        column = min(max(round((x - west) / CELL), 0), wide - 1)
+        row = min(max(round((z - south) / CELL), 0), deep - 1)
+        return bool(bitmap[column, row])
+
+    @cached_property
+    def _corner(self) -> tuple[float, float]:
+        west, south = self.origin.tolist()
+        return west, south
 
 
 def connected(seeds: Bitmap, on: Bitmap) -> Bitmap:
