@@ -51,6 +51,7 @@ transform-cache 0
 DRAWING = RLock()
 """The lock for making, changing or drawing a scene graph: all threads share Panda's objects."""
 _DEPTH_STEPS = float(1 << 20)
+_NO_IDS = np.empty((0, 0), np.uint8)
 _VERTEX = np.dtype([("at", "<f4", 3), ("colour", "u1", 4), ("uv", "<f4", 2)])
 
 
@@ -60,7 +61,7 @@ class Frames:
 
     Attributes:
         rgb: (H, W, 3) uint8.
-        ids: (H, W) uint8 number of the instance, 0 for none.
+        ids: (H, W) uint8 number of the instance, 0 for none; empty unless asked for.
         depth: (H, W) float32 metres along the view axis, None unless asked for.
     """
 
@@ -161,7 +162,7 @@ class Rasteriser:
         region.setCamera(self._camera)
         self._show_depth = p3d.ConfigVariableBool("td-show-zbuffer", False)
 
-    def draw(self, root: Any, camera: Camera, depth: bool = False) -> Frames:
+    def draw(self, root: Any, camera: Camera, depth: bool = False, *, ids: bool = True) -> Frames:
         """The images of a camera in a scene graph; the caller owns the arrays."""
         with DRAWING:
             width, height = camera.width, camera.height
@@ -173,17 +174,19 @@ class Rasteriser:
             half = tan(radians(fov) / 2)
             self._lens.setFov(2 * degrees(atan(half * width / height)), fov)
             x, y, z = (float(value) for value in camera.position)
-            self._camera.reparentTo(root)
+            # Not a node of the graph: moving it there would compute the graph's bounds again.
+            self._camera.node().setScene(root)
             self._camera.setPos(x, z, y)
             self._camera.setHpr(-camera.yaw, -camera.horizon, -camera.roll)
             self._show_depth.setValue(depth)
             self._engine.renderFrame()
             pixels = np.frombuffer(self._picture.getRamImage(), np.uint8)
             pixels = pixels.reshape(height, width, 4)[::-1]
-            ids, rgb = pixels[..., 3].copy(), np.empty((height, width, 3), dtype=np.uint8)
+            rgb = np.empty((height, width, 3), dtype=np.uint8)
             for channel in range(3):  # faster than all channels at once
                 rgb[..., channel] = pixels[..., 2 - channel]
-            return Frames(rgb, ids, self._depth(width, height) if depth else None)
+            seen = pixels[..., 3].copy() if ids else _NO_IDS
+            return Frames(rgb, seen, self._depth(width, height) if depth else None)
 
     def _depth(self, width: int, height: int) -> NDArray[np.float32]:
         if self._steps is None:  # 0 is far, 2**20 is near

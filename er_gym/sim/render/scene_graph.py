@@ -10,9 +10,13 @@ objects in an order of their own.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from er_gym.sim.render.appearance import Appearance, appearance_of
 from er_gym.sim.render.camera import Camera
@@ -62,19 +66,25 @@ class SceneGraph:
         self._build()
         self._state: object | None = object()  # the state that it shows; None while it changes
 
-    def draw(self, world: World, camera: Camera, depth: bool = False) -> Frames:
+    def draw(
+        self, world: World, camera: Camera, depth: bool = False, *, ids: bool = True
+    ) -> Frames:
         """The images of a camera in a world of this scene; object i is instance i + 1.
 
         Several threads may call this at once; they take turns.
         """
         with DRAWING:
             self._follow(world)
-            return rasteriser().draw(self._root, camera, depth)
+            return rasteriser().draw(self._root, camera, depth, ids=ids)
 
     def _build(self) -> None:
         """Build the room without its objects."""
         self._root = core().NodePath(self._name)
         self._placed: dict[int, _Placed] = {}
+        # Of the world that is shown: the rows that have changed since it was recorded, and which
+        # objects are hidden.
+        self._touched: set[int] = set()
+        self._hidden: NDArray[np.bool_] | None = None
         shell = room_shell(self._name)
         around = {"room": shell.rest, "fixtures": fixtures(self._name)}
         for k, (name, patches) in enumerate({**around, "carcasses": carcasses(self._name)}.items()):
@@ -92,14 +102,22 @@ class SceneGraph:
                     self._place(world, i, self._placed[i].order)
             self._state = before
             return
-        shown, order = (~world.hidden).tolist(), _order(world)
-        for i in range(max(len(world), max(self._placed, default=-1) + 1)):
-            if i >= len(world) or not shown[i]:
+        hidden, order = world.hidden, _order(world)
+        # An object that has never changed is the same in all worlds of the scene.
+        rows = world.touched | self._touched
+        if self._hidden is None:
+            rows |= set(range(len(world)))
+        else:
+            both = min(len(hidden), len(self._hidden))
+            rows.update(np.flatnonzero(hidden[:both] != self._hidden[:both]).tolist())
+        for i in sorted(rows):
+            if i >= len(world) or hidden[i]:
                 self._remove(i)
             elif world.types[i] in UNSEEN:
                 self._lay_floor(i)
             else:
                 self._place(world, i, order[i])
+        self._touched, self._hidden = set(world.touched), hidden.copy()
         self._state = world.cache.state.put(_SHOWN, object())
 
     def _lay_floor(self, i: int) -> None:
@@ -130,12 +148,14 @@ class SceneGraph:
         self._placed[i] = _Placed(seen, solid, order, path)
 
 
-def _order(world: World) -> list[int]:
+def _order(world: World) -> Sequence[int]:
     """The order of drawing: recorded objects by row, then the others by name.
 
     The rows of slices and copies depend on which were made first.
     """
     recorded = len(world.scene)
+    if len(world) == recorded:
+        return range(recorded)
     others = sorted(range(recorded, len(world)), key=lambda i: world.names[i])
     rank = {i: recorded + k for k, i in enumerate(others)}
     return [*range(recorded), *(rank[i] for i in range(recorded, len(world)))]

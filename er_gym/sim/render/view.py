@@ -110,7 +110,7 @@ def _cameras(world: World) -> Iterator[Camera]:
 
 def _draw(world: World, camera: Camera) -> View:
     settings = world.settings
-    frames = _frames(world, camera, settings.render_depth)
+    frames = _frames(world, camera, settings.render_depth, ids=settings.draws_colors)
     view = View(
         frames.rgb,
         frames.depth,
@@ -124,12 +124,12 @@ def _draw(world: World, camera: Camera) -> View:
     return view
 
 
-def _frames(world: World, camera: Camera, depth: bool = False) -> Frames:
+def _frames(world: World, camera: Camera, depth: bool = False, *, ids: bool = True) -> Frames:
     from er_gym.sim.render.scene_graph import (
         scene_graph_of,
     )  # most worlds are never drawn
 
-    return scene_graph_of(world.scene.name).draw(world, camera, depth)
+    return scene_graph_of(world.scene.name).draw(world, camera, depth, ids=ids)
 
 
 def _colored(frames: Frames, names: Sequence[str]) -> NDArray[np.uint8]:
