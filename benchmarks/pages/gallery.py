@@ -25,8 +25,8 @@ from benchmarks.harness.samples import sheet
 from er_gym.sim.actions import perform
 from er_gym.sim.agent import Agent
 from er_gym.sim.render.appearance import Appearance, compute_appearance
+from er_gym.sim.render.bake import pieces_of_look
 from er_gym.sim.render.camera import Camera
-from er_gym.sim.render.lighting import lit_colours
 from er_gym.sim.render.panda import core, geometry, rasteriser
 from er_gym.sim.render.scene_graph import scene_graph_of
 from er_gym.sim.render.shapes import SHAPES, build
@@ -107,13 +107,9 @@ def states(look: Appearance) -> Iterator[tuple[str, Appearance]]:
 
 def portrait(look: Appearance, side: int = _SIDE, yaw: float = 30.0) -> NDArray[np.uint8]:
     """(S, S, 3) a thing by itself, seen from its front, ``yaw`` degrees aside, and from above."""
-    parts = [
-        (m, p.vertices, lit_colours(m, p, 0.0, look.size[1], look.height), p.uv, p.triangles)
-        for m, p in build(look).items()
-    ]
     root = core().NodePath("portrait")
-    root.attachNewNode(geometry(parts, 1, look.kind))
-    corners = np.concatenate([vertices for _, vertices, _, _, _ in parts])
+    root.attachNewNode(geometry(pieces_of_look(look, 0.0), 1, look.kind))
+    corners = np.concatenate([patch.vertices for patch in build(look).values()])
     low, high = corners.min(axis=0), corners.max(axis=0)
     middle, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     away = max(radius / np.sin(np.radians(20)), 0.12 + radius)

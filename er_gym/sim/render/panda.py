@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.libx11 import provide_libx11
 from er_gym.sim.render.materials import MATERIALS
+from er_gym.sim.render.pieces import Piece
 from er_gym.sim.render.textures import texture
 
 NEAR, FAR = 0.1, 40.0
@@ -52,7 +53,6 @@ DRAWING = RLock()
 """The lock for making, changing or drawing a scene graph: all threads share Panda's objects."""
 _DEPTH_STEPS = float(1 << 20)
 _NO_IDS = np.empty((0, 0), np.uint8)
-_VERTEX = np.dtype([("at", "<f4", 3), ("colour", "u1", 4), ("uv", "<f4", 2)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,43 +239,28 @@ def state(material: str) -> Any:
     return p3d.RenderState.make(p3d.TextureAttrib.make(_texture(surface.texture)), colours, order)
 
 
-def geometry(
-    parts: Iterable[
-        tuple[str, NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]
-    ],
-    number: int,
-    name: str,
-) -> Any:
-    """A node that draws triangles as instance ``number`` (0: none).
-
-    Args:
-        parts: for each material its name, vertices (V, 3), colours (V, 3), uv (V, 2) and triangles
-            (F, 3).
-    """
+def geometry(pieces: Iterable[Piece], number: int, name: str) -> Any:
+    """A node that draws pieces as instance ``number`` (0: none)."""
     if number > MOST_INSTANCES:
         raise ValueError(f"there can be {MOST_INSTANCES} instances, not {number}")
     p3d = core()
     node = p3d.GeomNode(name)
-    for material, at, colours, uv, triangles in parts:
+    for piece in pieces:
         # With a texture, the software rasteriser lowers each alpha by 1.
-        textured = MATERIALS[material].texture is not None and _device() == "cpu"
-        rows = np.empty(len(at), dtype=_VERTEX)
-        rows["at"] = at[:, [0, 2, 1]]
-        rows["colour"][:, :3] = np.clip(colours, 0.0, 1.0) * 255 + 0.5
+        textured = MATERIALS[piece.material].texture is not None and _device() == "cpu"
+        rows = piece.vertices.copy()
         rows["colour"][:, 3] = number + (1 if textured and number else 0)
-        rows["uv"] = uv
         data = p3d.GeomVertexData(name, p3d.GeomVertexFormat.getV3c4t2(), p3d.Geom.UHStatic)
         data.uncleanSetNumRows(len(rows))
         data.modifyArrayHandle(0).copyDataFrom(rows.tobytes())
-        wide = len(rows) >= 65536
+        wide = piece.triangles.dtype == np.uint32
         primitive = p3d.GeomTriangles(p3d.Geom.UHStatic)
         primitive.setIndexType(p3d.Geom.NTUint32 if wide else p3d.Geom.NTUint16)
         # Panda's frame is right-handed, so mirrored triangles go round the other way.
-        index = np.ascontiguousarray(triangles, dtype=np.uint32 if wide else np.uint16)
         array = primitive.modifyVertices()
-        array.uncleanSetNumRows(index.size)
-        array.modifyHandle().copyDataFrom(index.tobytes())
+        array.uncleanSetNumRows(piece.triangles.size)
+        array.modifyHandle().copyDataFrom(piece.triangles.tobytes())
         geom = p3d.Geom(data)
         geom.addPrimitive(primitive)
-        node.addGeom(geom, state(material))
+        node.addGeom(geom, state(piece.material))
     return node

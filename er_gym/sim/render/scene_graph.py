@@ -19,10 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.render.appearance import Appearance, appearance_of
+from er_gym.sim.render.bake import (
+    Place,
+    bake_of,
+    heading_of,
+    look_of,
+    pieces_of_look,
+    place_of,
+)
 from er_gym.sim.render.camera import Camera
-from er_gym.sim.render.carcasses import carcasses
-from er_gym.sim.render.fixtures import fixtures
-from er_gym.sim.render.lighting import lit_colours
 from er_gym.sim.render.panda import (
     DRAWING,
     MOST_INSTANCES,
@@ -31,9 +36,7 @@ from er_gym.sim.render.panda import (
     geometry,
     rasteriser,
 )
-from er_gym.sim.render.patch import Patch
-from er_gym.sim.render.room_shell import room_shell
-from er_gym.sim.render.shapes import UNSEEN, build
+from er_gym.sim.render.shapes import UNSEEN
 from er_gym.sim.space.solids import Solid, solid_of
 from er_gym.sim.world import World
 from er_gym.sim.world_cache import CacheKey
@@ -44,18 +47,27 @@ _SHOWN: CacheKey[object] = CacheKey("state that a scene graph shows")
 _NODES = 2048
 _BEFORE = 8
 """The parts of the room come first in the order of drawing: they start this far below 0."""
-_HEADING = 1.0
-"""Headings are rounded to a multiple of this for lighting, degrees."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """An object in the graph, and the state that it was drawn in."""
+    """An object in the graph.
 
-    appearance: Appearance
-    solid: Solid
+    Attributes:
+        look: a name of what it looks like.
+        order: of drawing.
+        path: its node.
+        seen, solid: the state that it was drawn in; None if it is as recorded.
+    """
+
+    look: str
     order: int
     path: Any
+    seen: Appearance | None = None
+    solid: Solid | None = None
+
+    def shows(self, seen: Appearance, heading: float) -> bool:
+        return self.solid is not None and self.seen == seen and heading_of(self.solid) == heading
 
 
 class SceneGraph:
@@ -85,11 +97,9 @@ class SceneGraph:
         # objects are hidden.
         self._touched: set[int] = set()
         self._hidden: NDArray[np.bool_] | None = None
-        shell = room_shell(self._name)
-        around = {"room": shell.rest, "fixtures": fixtures(self._name)}
-        for k, (name, patches) in enumerate({**around, "carcasses": carcasses(self._name)}.items()):
-            self._root.attachNewNode(_drawn(patches, 0, name), k - _BEFORE)
-        self._floor, self._floor_number = shell.floor, -1
+        for k, (name, pieces) in enumerate(bake_of(self._name).around.items()):
+            self._root.attachNewNode(geometry(pieces, 0, name), k - _BEFORE)
+        self._floor_number = -1
 
     def _follow(self, world: World) -> None:
         """Update everything that has changed in the world."""
@@ -110,11 +120,14 @@ class SceneGraph:
         else:
             both = min(len(hidden), len(self._hidden))
             rows.update(np.flatnonzero(hidden[:both] != self._hidden[:both]).tolist())
+        recorded = bake_of(self._name).recorded
         for i in sorted(rows):
             if i >= len(world) or hidden[i]:
                 self._remove(i)
             elif world.types[i] in UNSEEN:
                 self._lay_floor(i)
+            elif i in recorded and i not in world.touched:
+                self._place_as_recorded(i, world.types[i])
             else:
                 self._place(world, i, order[i])
         self._touched, self._hidden = set(world.touched), hidden.copy()
@@ -122,7 +135,8 @@ class SceneGraph:
 
     def _lay_floor(self, i: int) -> None:
         if self._floor_number != i + 1:
-            self._root.attachNewNode(_drawn(self._floor, i + 1, "floor"), -1)
+            node = geometry(bake_of(self._name).floor, i + 1, "floor")
+            self._root.attachNewNode(node, -1)
             self._floor_number = i + 1
 
     def _remove(self, i: int) -> None:
@@ -130,22 +144,47 @@ class SceneGraph:
         if placed is not None:
             placed.path.removeNode()
 
-    def _place(self, world: World, i: int, order: int) -> None:
-        seen, solid, before = appearance_of(world, i), solid_of(world, i), self._placed.get(i)
-        same = before is not None and before.appearance == seen and before.order == order
-        if before is not None and same and before.solid is solid:
+    def _place_as_recorded(self, i: int, kind: str) -> None:
+        before, bake = self._placed.get(i), bake_of(self._name)
+        if before is not None and before.seen is None:
             return
-        heading = _heading(solid)
-        if before is not None and same and _heading(before.solid) == heading:
+        look, place = bake.recorded[i]
+        if before is not None and before.look == look and before.order == i:
             path = before.path
         else:
-            self._remove(i)
-            number = i + 1 if i < MOST_INSTANCES else 0  # there may be more copies than instances
-            # A copy shares the triangles, and its place is a property of the node.
-            path = self._root.attachNewNode(_node(seen, heading, number).makeCopy(), order)
-        x, y, z = solid.middle.tolist()
-        path.setPosHpr(x, z, y + float(solid.upright[:, 0, 1].min()), -solid.yaw, 0.0, 0.0)
-        self._placed[i] = _Placed(seen, solid, order, path)
+            path = self._attach(i, geometry(bake.looks[look], _number(i), kind), i)
+        self._placed[i] = _Placed(look, i, path)
+        _put(path, place)
+
+    def _place(self, world: World, i: int, order: int) -> None:
+        seen, solid, before = appearance_of(world, i), solid_of(world, i), self._placed.get(i)
+        heading = heading_of(solid)
+        if before is not None and before.order == order and before.shows(seen, heading):
+            if before.solid is solid:
+                return
+            look, path = before.look, before.path
+        else:
+            look = look_of(seen, heading)
+            if before is not None and before.order == order and before.look == look:
+                path = before.path
+            else:
+                # A copy shares the triangles, and its place is a property of the node.
+                path = self._attach(i, _node(seen, heading, _number(i)).makeCopy(), order)
+        self._placed[i] = _Placed(look, order, path, seen, solid)
+        _put(path, place_of(solid))
+
+    def _attach(self, i: int, node: Any, order: int) -> Any:
+        self._remove(i)
+        return self._root.attachNewNode(node, order)
+
+
+def _put(path: Any, place: Place) -> None:
+    path.setPosHpr(place.x, place.z, place.y, -place.yaw, 0.0, 0.0)
+
+
+def _number(i: int) -> int:
+    """The instance of object i; 0 for no instance, as there may be more copies than numbers."""
+    return i + 1 if i < MOST_INSTANCES else 0
 
 
 def _order(world: World) -> Sequence[int]:
@@ -161,23 +200,10 @@ def _order(world: World) -> Sequence[int]:
     return [*range(recorded), *(rank[i] for i in range(recorded, len(world)))]
 
 
-def _heading(solid: Solid) -> float:
-    return round(solid.yaw / _HEADING) * _HEADING % 360.0
-
-
-def _drawn(patches: dict[str, Patch], number: int, name: str) -> Any:
-    """A node of lit triangles."""
-    parts = [(m, p.vertices, p.colours, p.uv, p.triangles) for m, p in patches.items()]
-    return geometry(parts, number, name)
-
-
 @lru_cache(maxsize=_NODES)
 def _node(seen: Appearance, heading: float, number: int) -> Any:
-    parts = [
-        (m, p.vertices, lit_colours(m, p, heading, seen.size[1], seen.height), p.uv, p.triangles)
-        for m, p in build(seen).items()
-    ]
-    return geometry(parts, number, seen.kind)
+    pieces = bake_of(seen.scene).looks.get(look_of(seen, heading))
+    return geometry(pieces or pieces_of_look(seen, heading), number, seen.kind)
 
 
 @lru_cache(maxsize=_SCENES)

@@ -26,6 +26,8 @@ from er_gym.sim.render.texture_drawing import (
     rectangle,
     stretched,
 )
+from er_gym.sim.source_key import source_key
+from er_gym.writing import kept
 
 SURFACES: dict[str, Painter] = {}
 """Textures of surfaces: they are nearly white, and they tile."""
@@ -39,6 +41,11 @@ def _surface(function: Painter) -> Painter:
 @cache
 def texture(name: str) -> NDArray[np.uint8]:
     """(S, S, 3) a texture by name, top row first; S is a power of two."""
+    drawn = kept("render", source_key(), f"{name}.texture", lambda: _drawn(name).tobytes())
+    return np.frombuffer(drawn, np.uint8).reshape(SIDE, SIDE, 3)
+
+
+def _drawn(name: str) -> NDArray[np.uint8]:
     seed = int.from_bytes(blake2b(name.encode(), digest_size=8).digest(), "big")
     picture = TEXTURES[name](np.random.default_rng(seed))
     if picture.ndim == 2:

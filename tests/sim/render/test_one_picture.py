@@ -10,6 +10,7 @@ from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.materials import MATERIALS
 from er_gym.sim.render.mesh import Mesh
 from er_gym.sim.render.panda import core, geometry, rasteriser
+from er_gym.sim.render.pieces import pieces_of
 from er_gym.sim.render.scene_graph import SceneGraph, scene_graph_of
 from er_gym.sim.scene import SCENE_NAMES
 from er_gym.sim.world import World
@@ -19,8 +20,7 @@ from tests.sim.render.test_scene_graph import camera_of, do, one, stand, world_o
 def _panel(number: int, material: str = "plain") -> object:
     mesh = Mesh()
     mesh.panel((0.0, 0.0, 1.0), (4.0, 4.0), (1.0, 1.0, 1.0), material, facing="z")
-    parts = [(m, p.vertices, p.colours, p.uv, p.triangles) for m, p in mesh.patches().items()]
-    return geometry(parts, number, f"panel {number}")
+    return geometry(pieces_of(mesh.patches()), number, f"panel {number}")
 
 
 def test_of_surfaces_at_the_same_depth_the_first_in_order_is_seen() -> None:
