@@ -46,9 +46,11 @@ notify-level error
 textures-power-2 down
 garbage-collect-states 0
 uniquify-transforms 0
+bounds-type box
 transform-cache 0
 """
-"""Panda would otherwise merge transforms that are nearly equal and keep the older one."""
+"""Panda would otherwise merge transforms that are nearly equal and keep the older one, and find
+fewer things to be out of sight, since most are no balls."""
 DRAWING = RLock()
 """The lock for making, changing or drawing a scene graph: all threads share Panda's objects."""
 _DEPTH_STEPS = float(1 << 20)
