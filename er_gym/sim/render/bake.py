@@ -16,14 +16,19 @@ from hashlib import blake2b
 from typing import Any
 
 import msgpack  # type: ignore[import-untyped]
+import numpy as np
+from numpy.typing import NDArray
 
 from er_gym.sim.render.appearance import Appearance, compute_appearance
 from er_gym.sim.render.carcasses import carcasses
 from er_gym.sim.render.fixtures import fixtures
 from er_gym.sim.render.lighting import lit_colours
 from er_gym.sim.render.pieces import Piece, packed, piece_of, pieces_of, unpacked
+from er_gym.sim.render.place import Place, place_of
 from er_gym.sim.render.room_shell import room_shell
+from er_gym.sim.render.shades import shade_of, shades_of_room
 from er_gym.sim.render.shapes import UNSEEN, build, is_added
+from er_gym.sim.render.soft_light import Daylight, daylight
 from er_gym.sim.scene import load_scene, scene_file
 from er_gym.sim.settings import Settings
 from er_gym.sim.source_key import source_key
@@ -39,16 +44,6 @@ _HEADING = 1.0
 _FASTEST = 1
 
 
-@dataclass(frozen=True)
-class Place:
-    """Where a node stands: x, y and z in metres, and its heading in degrees."""
-
-    x: float
-    y: float
-    z: float
-    yaw: float
-
-
 @dataclass(frozen=True, eq=False)
 class Bake:
     """A room as recorded.
@@ -58,12 +53,16 @@ class Bake:
         floor: the object of type Floor.
         recorded: for the rows of objects their look and their place.
         looks: the pieces of each look.
+        day: the room's daylight.
+        shades: for the rows of objects their shadows, and for -1 those of the room itself.
     """
 
     around: Mapping[str, Pieces]
     floor: Pieces
     recorded: Mapping[int, tuple[str, Place]]
     looks: Mapping[str, Pieces]
+    day: Daylight
+    shades: Mapping[int, Piece]
 
 
 @lru_cache(maxsize=_BAKES)
@@ -83,12 +82,6 @@ def look_of(seen: Appearance, heading: float) -> str:
 def heading_of(solid: Solid) -> float:
     """The heading of an object that its light is computed for, degrees."""
     return round(solid.yaw / _HEADING) * _HEADING % 360.0
-
-
-def place_of(solid: Solid) -> Place:
-    """Where the node of an object stands."""
-    x, y, z = solid.middle.tolist()
-    return Place(x, y + float(solid.upright[:, 0, 1].min()), z, solid.yaw)
 
 
 def pieces_of_look(seen: Appearance, heading: float) -> Pieces:
@@ -116,7 +109,11 @@ def _made(scene_name: str) -> Bake:
         "fixtures": pieces_of(fixtures(scene_name)),
         "carcasses": pieces_of(carcasses(scene_name)),
     }
-    return Bake(around, pieces_of(shell.floor), recorded, looks)
+    floor = pieces_of(shell.floor)
+    day = daylight(scene_name, (*around["room"], *floor))
+    shades = {-1: shades_of_room(scene_name, day)}
+    shades.update((i, shade_of(world, i, i, day)) for i in range(len(world)))
+    return Bake(around, floor, recorded, looks, day, {i: s for i, s in shades.items() if s})
 
 
 def _without_added(bake: Bake, types: Sequence[str]) -> Bake:
@@ -135,15 +132,25 @@ def _written(bake: Bake) -> bytes:
             for i, (look, place) in bake.recorded.items()
         ],
         "looks": {look: packed(pieces) for look, pieces in bake.looks.items()},
+        "day": [each.tolist() for each in (bake.day.at, bake.day.into, bake.day.areas)],
+        "even": bake.day.even,
+        "shades": [[i, packed([shade])] for i, shade in bake.shades.items()],
     }
     return zlib.compress(msgpack.packb(whole), _FASTEST)
 
 
 def _read(data: bytes) -> Bake:
     whole: dict[str, Any] = msgpack.unpackb(zlib.decompress(data))
+    at, into, areas = whole["day"]
     return Bake(
         {name: unpacked(pieces) for name, pieces in whole["around"].items()},
         unpacked(whole["floor"]),
         {i: (look, Place(*place)) for i, look, place in whole["recorded"]},
         {look: unpacked(pieces) for look, pieces in whole["looks"].items()},
+        Daylight(_single(at), _single(into), _single(areas), whole["even"]),
+        {i: unpacked(shade)[0] for i, shade in whole["shades"]},
     )
+
+
+def _single(values: list[Any]) -> NDArray[np.float32]:
+    return np.array(values, dtype=np.float32)

@@ -1,16 +1,20 @@
 """The scene graph of a room: what is drawn, and where.
 
-An object that looks the same as before is not made again. Triangles are cached by appearance, and
-nodes by appearance, heading and number. Only objects that have changed are updated.
+An object that looks the same as before is not made again. Rooms as recorded come out of a bake
+(:mod:`er_gym.sim.render.bake`); what has changed since is made, and kept by appearance, heading and
+number. Only objects that have changed are updated.
 
 Even so, a picture depends on the world alone and not on what was drawn before. Of surfaces at the
 same depth the one drawn first is seen. So the order of drawing is fixed: first the room, then the
 objects in an order of their own.
+
+In soft light, colours depend on where an object is and on the lamps that are on, and shadows lie
+under what stands on something. What is in the hand is drawn in flat light, wherever it is carried.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -19,14 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.render.appearance import Appearance, appearance_of
-from er_gym.sim.render.bake import (
-    Place,
-    bake_of,
-    heading_of,
-    look_of,
-    pieces_of_look,
-    place_of,
-)
+from er_gym.sim.render.bake import Pieces, bake_of, heading_of, look_of, pieces_of_look
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.panda import (
     DRAWING,
@@ -36,15 +33,21 @@ from er_gym.sim.render.panda import (
     geometry,
     rasteriser,
 )
+from er_gym.sim.render.place import Place, place_of
+from er_gym.sim.render.shades import shade_of
 from er_gym.sim.render.shapes import UNSEEN
+from er_gym.sim.render.soft_light import Lamp, lamps_on, lit
+from er_gym.sim.settings import FLAT, SOFT
 from er_gym.sim.space.solids import Solid, solid_of
 from er_gym.sim.world import World
 from er_gym.sim.world_cache import CacheKey
 
 _SCENES = 64
 """Rooms whose scene graphs are kept."""
-_SHOWN: CacheKey[object] = CacheKey("state that a scene graph shows")
-_NODES = 2048
+_SHOWN: dict[str, CacheKey[object]] = {
+    light: CacheKey(f"state that a scene graph in {light} light shows") for light in (SOFT, FLAT)
+}
+_NODES, _PIECES = 2048, 256
 _BEFORE = 8
 """The parts of the room come first in the order of drawing: they start this far below 0."""
 
@@ -57,12 +60,14 @@ class _Placed:
         look: a name of what it looks like.
         order: of drawing.
         path: its node.
+        lit_at: the place whose light it is drawn in, None for flat light.
         seen, solid: the state that it was drawn in; None if it is as recorded.
     """
 
     look: str
     order: int
     path: Any
+    lit_at: Place | None
     seen: Appearance | None = None
     solid: Solid | None = None
 
@@ -70,12 +75,20 @@ class _Placed:
         return self.solid is not None and self.seen == seen and heading_of(self.solid) == heading
 
 
-class SceneGraph:
-    """The scene graph of one scene; use :func:`scene_graph_of`."""
+@dataclass(frozen=True, eq=False)
+class _Shaded:
+    """The shadow of an object: its node, None if it has none, and the state that it depends on."""
 
-    def __init__(self, scene_name: str) -> None:
-        self._name = scene_name
-        self._build()
+    path: Any
+    depends: tuple[object, ...]
+
+
+class SceneGraph:
+    """The scene graph of one scene in a light; use :func:`scene_graph_of`."""
+
+    def __init__(self, scene_name: str, light: str = SOFT) -> None:
+        self._name, self._soft, self._key = scene_name, light == SOFT, _SHOWN[light]
+        self._build(())
         self._state: object | None = object()  # the state that it shows; None while it changes
 
     def draw(
@@ -87,95 +100,154 @@ class SceneGraph:
         """
         with DRAWING:
             self._follow(world)
-            return rasteriser().draw(self._root, camera, depth, ids=ids)
+            veils = self._veils if self._soft else None
+            return rasteriser().draw(self._root, camera, depth, ids=ids, veils=veils)
 
-    def _build(self) -> None:
-        """Build the room without its objects."""
+    def _build(self, lamps: tuple[Lamp, ...]) -> None:
+        """Build the room without its objects, in the light of some lamps."""
+        bake = bake_of(self._name)
         self._root = core().NodePath(self._name)
+        self._lamps = lamps
         self._placed: dict[int, _Placed] = {}
+        self._shaded: dict[int, _Shaded] = {}
         # Of the world that is shown: the rows that have changed since it was recorded, and which
         # objects are hidden.
         self._touched: set[int] = set()
         self._hidden: NDArray[np.bool_] | None = None
-        for k, (name, pieces) in enumerate(bake_of(self._name).around.items()):
-            self._root.attachNewNode(geometry(pieces, 0, name), k - _BEFORE)
+        for k, (name, pieces) in enumerate(bake.around.items()):
+            self._root.attachNewNode(geometry(self._lit(pieces), 0, name), k - _BEFORE)
         self._floor_number = -1
+        self._veils = core().NodePath("veils")
+        if self._soft and -1 in bake.shades:
+            self._veils.attachNewNode(geometry([bake.shades[-1]], 0, "veil"), -1)
 
     def _follow(self, world: World) -> None:
         """Update everything that has changed in the world."""
         before, self._state = self._state, None
         if before is None:  # an exception left it half updated
-            self._build()
-        elif world.cache.state.get(_SHOWN) is before:
+            self._build(self._lamps)
+        elif world.cache.state.get(self._key) is before:
             for i in world.in_hand:  # nothing but the hand has moved
                 if i in self._placed:
                     self._place(world, i, self._placed[i].order)
             self._state = before
             return
-        hidden, order = world.hidden, _order(world)
+        lamps = lamps_on(world) if self._soft else ()
+        if lamps != self._lamps:
+            self._build(lamps)
+        rows, hidden, order = self._rows(world), world.hidden, _order(world)
+        recorded = bake_of(self._name).recorded
+        for i in sorted(rows):
+            if i >= len(world) or hidden[i]:
+                self._remove(i)
+                continue
+            if world.types[i] in UNSEEN:
+                self._lay_floor(i)
+                continue
+            if i in recorded and i not in world.touched:
+                self._place_as_recorded(i, world.types[i])
+            else:
+                self._place(world, i, order[i])
+            if self._soft:
+                self._shade(world, i, order[i])
+        self._touched, self._hidden = set(world.touched), hidden.copy()
+        self._state = world.cache.state.put(self._key, object())
+
+    def _rows(self, world: World) -> set[int]:
+        """The rows that this world may show in another way than the one that is shown."""
+        hidden, contents = world.hidden, world.contents
         # An object that has never changed is the same in all worlds of the scene.
         rows = world.touched | self._touched
+        if self._soft:  # a shadow depends on what it falls on
+            rows |= {child for i in rows if i < len(world) for child in contents[i]}
         if self._hidden is None:
             rows |= set(range(len(world)))
         else:
             both = min(len(hidden), len(self._hidden))
             rows.update(np.flatnonzero(hidden[:both] != self._hidden[:both]).tolist())
-        recorded = bake_of(self._name).recorded
-        for i in sorted(rows):
-            if i >= len(world) or hidden[i]:
-                self._remove(i)
-            elif world.types[i] in UNSEEN:
-                self._lay_floor(i)
-            elif i in recorded and i not in world.touched:
-                self._place_as_recorded(i, world.types[i])
-            else:
-                self._place(world, i, order[i])
-        self._touched, self._hidden = set(world.touched), hidden.copy()
-        self._state = world.cache.state.put(_SHOWN, object())
+        return rows
 
     def _lay_floor(self, i: int) -> None:
         if self._floor_number != i + 1:
-            node = geometry(bake_of(self._name).floor, i + 1, "floor")
+            node = geometry(self._lit(bake_of(self._name).floor), i + 1, "floor")
             self._root.attachNewNode(node, -1)
             self._floor_number = i + 1
 
     def _remove(self, i: int) -> None:
-        placed = self._placed.pop(i, None)
+        placed, shaded = self._placed.pop(i, None), self._shaded.pop(i, None)
         if placed is not None:
             placed.path.removeNode()
+        if shaded is not None and shaded.path is not None:
+            shaded.path.removeNode()
 
     def _place_as_recorded(self, i: int, kind: str) -> None:
         before, bake = self._placed.get(i), bake_of(self._name)
         if before is not None and before.seen is None:
             return
         look, place = bake.recorded[i]
-        if before is not None and before.look == look and before.order == i:
-            path = before.path
+        lit_at = place if self._soft else None
+        if before is None or (before.look, before.order, before.lit_at) != (look, i, lit_at):
+            node = geometry(self._lit(bake.looks[look], lit_at), _number(i), kind)
+            path = self._attach(i, node, i)
         else:
-            path = self._attach(i, geometry(bake.looks[look], _number(i), kind), i)
-        self._placed[i] = _Placed(look, i, path)
+            path = before.path
+        self._placed[i] = _Placed(look, i, path, lit_at)
         _put(path, place)
 
     def _place(self, world: World, i: int, order: int) -> None:
         seen, solid, before = appearance_of(world, i), solid_of(world, i), self._placed.get(i)
-        heading = heading_of(solid)
-        if before is not None and before.order == order and before.shows(seen, heading):
-            if before.solid is solid:
-                return
-            look, path = before.look, before.path
-        else:
-            look = look_of(seen, heading)
-            if before is not None and before.order == order and before.look == look:
-                path = before.path
-            else:
+        heading, place = heading_of(solid), place_of(solid)
+        lit_at = place if self._soft and i not in world.in_hand else None
+        same = before is not None and before.shows(seen, heading)
+        look = before.look if before is not None and same else look_of(seen, heading)
+        if before is None or (before.look, before.order, before.lit_at) != (look, order, lit_at):
+            if lit_at is None:
                 # A copy shares the triangles, and its place is a property of the node.
-                path = self._attach(i, _node(seen, heading, _number(i)).makeCopy(), order)
-        self._placed[i] = _Placed(look, order, path, seen, solid)
-        _put(path, place_of(solid))
+                node = _node(seen, heading, _number(i)).makeCopy()
+            else:
+                node = geometry(self._lit(_pieces(seen, heading), lit_at), _number(i), seen.kind)
+            path = self._attach(i, node, order)
+        else:
+            path = before.path
+        self._placed[i] = _Placed(look, order, path, lit_at, seen, solid)
+        _put(path, place)
 
     def _attach(self, i: int, node: Any, order: int) -> Any:
-        self._remove(i)
+        placed = self._placed.pop(i, None)
+        if placed is not None:
+            placed.path.removeNode()
         return self._root.attachNewNode(node, order)
+
+    def _shade(self, world: World, i: int, order: int) -> None:
+        """Lay the shadow of object i."""
+        bake, before, on = bake_of(self._name), self._shaded.get(i), world.parents[i]
+        changed = not world.touched.isdisjoint((i, *on)) or i >= len(world.scene)
+        depends: tuple[object, ...] = ()
+        if changed:
+            held = i in world.in_hand
+            depends = (solid_of(world, i), order, held, on, *(solid_of(world, p) for p in on))
+        if before is not None and _all_same(before.depends, depends):
+            return
+        if before is not None and before.path is not None:
+            before.path.removeNode()
+        shade = shade_of(world, i, order, bake.day) if changed else bake.shades.get(i)
+        path = None
+        if shade is not None:
+            path = self._veils.attachNewNode(geometry([shade], 0, "veil"), order)
+        self._shaded[i] = _Shaded(path, depends)
+
+    def _lit(self, pieces: Pieces, place: Place | None = None) -> Iterable[Any]:
+        """Pieces in the light of the room at a place; without one, pieces of the room itself."""
+        if not self._soft:
+            return pieces
+        day = bake_of(self._name).day
+        return [lit(piece, place or Place(), day, self._lamps) for piece in pieces]
+
+
+def _all_same(one: tuple[object, ...], other: tuple[object, ...]) -> bool:
+    return len(one) == len(other) and all(
+        a is b or (not isinstance(a, Solid) and a == b) for a, b in zip(one, other, strict=True)
+    )
 
 
 def _put(path: Any, place: Place) -> None:
@@ -200,18 +272,23 @@ def _order(world: World) -> Sequence[int]:
     return [*range(recorded), *(rank[i] for i in range(recorded, len(world)))]
 
 
+@lru_cache(maxsize=_PIECES)
+def _pieces(seen: Appearance, heading: float) -> Pieces:
+    baked = bake_of(seen.scene).looks.get(look_of(seen, heading))
+    return baked or pieces_of_look(seen, heading)
+
+
 @lru_cache(maxsize=_NODES)
 def _node(seen: Appearance, heading: float, number: int) -> Any:
-    pieces = bake_of(seen.scene).looks.get(look_of(seen, heading))
-    return geometry(pieces or pieces_of_look(seen, heading), number, seen.kind)
+    return geometry(_pieces(seen, heading), number, seen.kind)
 
 
 @lru_cache(maxsize=_SCENES)
-def _scene_graph(scene_name: str) -> SceneGraph:
-    return SceneGraph(scene_name)
+def _scene_graph(scene_name: str, light: str) -> SceneGraph:
+    return SceneGraph(scene_name, light)
 
 
-def scene_graph_of(scene_name: str) -> SceneGraph:
-    """The scene graph of a scene; those of recently drawn scenes are kept."""
+def scene_graph_of(scene_name: str, light: str = SOFT) -> SceneGraph:
+    """The scene graph of a scene in a light; those of recently drawn scenes are kept."""
     with DRAWING:  # otherwise two threads could make two
-        return _scene_graph(scene_name)
+        return _scene_graph(scene_name, light)
