@@ -30,7 +30,10 @@ _NEAR = 1.2
 """Square metres that are added to squared distances, since windows are no points."""
 _WRAP = 0.35
 """How far beyond its edge a surface is still lit, as a cosine."""
-_LEAST, _MOST = 0.55, 1.7
+_LEAST, _MOST = 0.55, 1.4
+_WHITE = 248.0
+"""The lightest colour. The software rasteriser computes colours a little beyond a triangle's edge,
+and they would go on at 0 after 255."""
 _CEILING_AREA = 2.5
 """Of the lamp on the ceiling of rooms without windows, square metres."""
 _WARM = (1.0, 0.76, 0.44)
@@ -112,8 +115,10 @@ def lit(piece: Piece, place: Place, day: Daylight, lamps: Sequence[Lamp]) -> Pie
     level = np.clip(day.even * _level(day, points, normals), _LEAST, _MOST)[:, None]
     factor = level + sum(_lamplight(lamp, points, normals) for lamp in lamps)
     vertices = piece.vertices.copy()
-    colours = vertices["colour"][:, :3] * factor + 0.5
-    vertices["colour"][:, :3] = np.minimum(colours, 255.0)
+    colours = vertices["colour"][:, :3] * factor
+    # All channels of what would be too light are lowered alike, so that it keeps its colour.
+    colours *= np.minimum(_WHITE / np.maximum(colours.max(axis=1, keepdims=True), 1.0), 1.0)
+    vertices["colour"][:, :3] = colours + 0.5
     return replace(piece, vertices=vertices)
 
 
