@@ -37,8 +37,8 @@ from er_gym.sim.world import World
 from er_gym.writing import kept
 
 Pieces = tuple[Piece, ...]
-_BAKES = 64
-"""Rooms whose bakes are kept in memory."""
+_BAKES = 24
+"""Rooms whose bakes are kept in memory; others are read again."""
 _HEADING = 1.0
 """Headings are rounded to a multiple of this for lighting, degrees."""
 _FASTEST = 1
