@@ -14,7 +14,7 @@ under what stands on something. What is in the hand is drawn in flat light, wher
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -23,20 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.render.appearance import Appearance, appearance_of
-from er_gym.sim.render.bake import Pieces, bake_of, heading_of, look_of, pieces_of_look
+from er_gym.sim.render.bake import bake_of, heading_of, look_of
 from er_gym.sim.render.camera import Camera
-from er_gym.sim.render.panda import (
-    DRAWING,
-    MOST_INSTANCES,
-    Frames,
-    core,
-    geometry,
-    rasteriser,
-)
+from er_gym.sim.render.nodes import FLOOR, made_node, recorded_node, room_node, veil_node
+from er_gym.sim.render.panda import DRAWING, MOST_INSTANCES, Frames, core, rasteriser
 from er_gym.sim.render.place import Place, place_of
 from er_gym.sim.render.shades import shade_of
 from er_gym.sim.render.shapes import UNSEEN
-from er_gym.sim.render.soft_light import Lamp, lamps_on, lit
+from er_gym.sim.render.soft_light import Lamp, lamps_on
 from er_gym.sim.settings import FLAT, SOFT
 from er_gym.sim.space.solids import Solid, solid_of
 from er_gym.sim.world import World
@@ -47,7 +41,6 @@ _SCENES = 64
 _SHOWN: dict[str, CacheKey[object]] = {
     light: CacheKey(f"state that a scene graph in {light} light shows") for light in (SOFT, FLAT)
 }
-_NODES, _PIECES = 2048, 256
 _BEFORE = 8
 """The parts of the room come first in the order of drawing: they start this far below 0."""
 
@@ -114,12 +107,12 @@ class SceneGraph:
         # objects are hidden.
         self._touched: set[int] = set()
         self._hidden: NDArray[np.bool_] | None = None
-        for k, (name, pieces) in enumerate(bake.around.items()):
-            self._root.attachNewNode(geometry(self._lit(pieces), 0, name), k - _BEFORE)
+        for k, part in enumerate(bake.around):
+            self._root.attachNewNode(self._part(part, 0), k - _BEFORE)
         self._floor_number = -1
         self._veils = core().NodePath("veils")
         if self._soft and -1 in bake.shades:
-            self._veils.attachNewNode(geometry([bake.shades[-1]], 0, "veil"), -1)
+            self._veils.attachNewNode(veil_node(bake.shades[-1]).makeCopy(), -1)
 
     def _follow(self, world: World) -> None:
         """Update everything that has changed in the world."""
@@ -169,8 +162,7 @@ class SceneGraph:
 
     def _lay_floor(self, i: int) -> None:
         if self._floor_number != i + 1:
-            node = geometry(self._lit(bake_of(self._name).floor), i + 1, "floor")
-            self._root.attachNewNode(node, -1)
+            self._root.attachNewNode(self._part(FLOOR, i + 1), -1)
             self._floor_number = i + 1
 
     def _remove(self, i: int) -> None:
@@ -187,8 +179,9 @@ class SceneGraph:
         look, place = bake.recorded[i]
         lit_at = place if self._soft else None
         if before is None or (before.look, before.order, before.lit_at) != (look, i, lit_at):
-            node = geometry(self._lit(bake.looks[look], lit_at), _number(i), kind)
-            path = self._attach(i, node, i)
+            lamps = self._lamps if self._soft else ()
+            node = recorded_node(self._name, look, lit_at, lamps, _number(i), kind)
+            path = self._attach(i, node.makeCopy(), i)
         else:
             path = before.path
         self._placed[i] = _Placed(look, i, path, lit_at)
@@ -201,11 +194,9 @@ class SceneGraph:
         same = before is not None and before.shows(seen, heading)
         look = before.look if before is not None and same else look_of(seen, heading)
         if before is None or (before.look, before.order, before.lit_at) != (look, order, lit_at):
-            if lit_at is None:
-                # A copy shares the triangles, and its place is a property of the node.
-                node = _node(seen, heading, _number(i)).makeCopy()
-            else:
-                node = geometry(self._lit(_pieces(seen, heading), lit_at), _number(i), seen.kind)
+            lamps = () if lit_at is None else self._lamps
+            # A copy shares the triangles, and its place is a property of the node.
+            node = made_node(seen, heading, lit_at, lamps, _number(i)).makeCopy()
             path = self._attach(i, node, order)
         else:
             path = before.path
@@ -233,15 +224,13 @@ class SceneGraph:
         shade = shade_of(world, i, order, bake.day) if changed else bake.shades.get(i)
         path = None
         if shade is not None:
-            path = self._veils.attachNewNode(geometry([shade], 0, "veil"), order)
+            path = self._veils.attachNewNode(veil_node(shade).makeCopy(), order)
         self._shaded[i] = _Shaded(path, depends)
 
-    def _lit(self, pieces: Pieces, place: Place | None = None) -> Iterable[Any]:
-        """Pieces in the light of the room at a place; without one, pieces of the room itself."""
-        if not self._soft:
-            return pieces
-        day = bake_of(self._name).day
-        return [lit(piece, place or Place(), day, self._lamps) for piece in pieces]
+    def _part(self, part: str, number: int) -> Any:
+        """A part of the room itself."""
+        lit_at = Place() if self._soft else None
+        return room_node(self._name, part, lit_at, self._lamps, number).makeCopy()
 
 
 def _all_same(one: tuple[object, ...], other: tuple[object, ...]) -> bool:
@@ -270,17 +259,6 @@ def _order(world: World) -> Sequence[int]:
     others = sorted(range(recorded, len(world)), key=lambda i: world.names[i])
     rank = {i: recorded + k for k, i in enumerate(others)}
     return [*range(recorded), *(rank[i] for i in range(recorded, len(world)))]
-
-
-@lru_cache(maxsize=_PIECES)
-def _pieces(seen: Appearance, heading: float) -> Pieces:
-    baked = bake_of(seen.scene).looks.get(look_of(seen, heading))
-    return baked or pieces_of_look(seen, heading)
-
-
-@lru_cache(maxsize=_NODES)
-def _node(seen: Appearance, heading: float, number: int) -> Any:
-    return geometry(_pieces(seen, heading), number, seen.kind)
 
 
 @lru_cache(maxsize=_SCENES)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,7 @@ _NONE = frozenset(
 """Types that hang on something or are built into it."""
 _ROUND = frozenset({"DogBed", "FloorLamp", "GarbageCan", "HousePlant", "Stool", "DeskLamp"})
 """Types that are round, besides what can be picked up."""
+_KEPT = 1024
 _LIFT, _APART, _LAYERS = 0.003, 0.0004, 16
 """Of a veil above what it lies on, and how far apart veils are that may overlap, metres; and at how
 many heights they are. One that is not below another would be hidden by it."""
@@ -94,7 +96,7 @@ def shade_of(world: World, i: int, order: int, day: Daylight) -> Piece | None:
     ground = _ground(world, i, float(low[1]), solid.middle[[0, 2]])
     if ground is None:
         return None
-    prints = list(_prints(world, i, float(low[1]) - ground.height))
+    prints = tuple(_prints(world, i, float(low[1]) - ground.height))
     return _veil(prints, ground, _shift(day, solid.middle), order)
 
 
@@ -108,7 +110,7 @@ def shades_of_room(scene_name: str, day: Daylight) -> Piece | None:
             for x0, z0, x1, z1 in found.footprint:
                 half = ((x1 - x0) / 2, (z1 - z0) / 2)
                 prints.append(_Print(((x0 + x1) / 2, (z0 + z1) / 2), half, 0.0, 0.05, tall, 0.0))
-    return _veil(prints, _Ground(plan.ground, None), (0.0, 0.0), 0)
+    return _veil(tuple(prints), _Ground(plan.ground, None), (0.0, 0.0), 0)
 
 
 def _ground(world: World, i: int, low: float, middle: Floats) -> _Ground | None:
@@ -169,8 +171,9 @@ def _shift(day: Daylight, middle: Floats) -> tuple[float, float]:
     return float(x), float(z)
 
 
+@lru_cache(maxsize=_KEPT)
 def _veil(
-    prints: list[_Print], ground: _Ground, shift: tuple[float, float], order: int
+    prints: tuple[_Print, ...], ground: _Ground, shift: tuple[float, float], order: int
 ) -> Piece | None:
     rows = []
     for k, each in enumerate(prints):

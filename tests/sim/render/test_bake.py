@@ -10,7 +10,7 @@ import pytest
 
 from er_gym.sim import source_key as key_module
 from er_gym.sim.render import bake as bake_module
-from er_gym.sim.render import scene_graph as graph_module
+from er_gym.sim.render import nodes
 from er_gym.sim.render.appearance import Appearance
 from er_gym.sim.render.bake import bake_of
 from er_gym.sim.render.mesh import Mesh
@@ -31,7 +31,8 @@ def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None
 
 def _forget() -> None:
     bake_of.cache_clear()
-    graph_module._node.cache_clear()
+    for each in (nodes.made_node, nodes.recorded_node, nodes.room_node, nodes._pieces):
+        each.cache_clear()
 
 
 def _files(folder: Path) -> list[Path]:
@@ -60,7 +61,7 @@ def test_a_room_out_of_the_cache_is_the_one_that_was_made(
     _forget()
     with monkeypatch.context() as patch:
         patch.setattr(bake_module, "_made", None)  # it is not made again
-        patch.setattr(graph_module, "pieces_of_look", _only_of_what_is_open)
+        patch.setattr(nodes, "pieces_of_look", _only_of_what_is_open)
         assert all(map(np.array_equal, _pictures(), made))
     for spoilt in (b"", file.read_bytes()[:-1], file.read_bytes()[:-1] + b"?"):
         file.write_bytes(spoilt)
