@@ -16,7 +16,7 @@ from er_gym.sim.render.pieces import Piece
 from er_gym.sim.render.place import Place
 from er_gym.sim.render.soft_light import Lamp, lit
 
-_NODES, _PIECES = 2048, 256
+_NODES, _PIECES = 1024, 256
 FLOOR = "floor"
 """The name of the part of the room that is the object of type Floor."""
 
