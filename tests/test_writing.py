@@ -24,6 +24,8 @@ from er_gym.writing import (
     ForeignFile,
     check_output,
     is_ours,
+    kept,
+    user_cache,
     whole_folder,
     write_atomic,
     write_output,
@@ -337,3 +339,31 @@ def test_a_folder_that_others_fill_meanwhile_is_theirs(tmp_path: Path) -> None:
     ):
         (tmp_path / "theirs").touch()
     assert [each.name for each in tmp_path.iterdir()] == ["theirs"]
+
+
+def test_what_is_kept_is_made_once_and_old_folders_go(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    made: list[bytes] = []
+
+    def make() -> bytes:
+        made.append(b"value")
+        return made[-1]
+
+    assert [kept("rooms", "k1", "a", make) for _ in range(3)] == [b"value"] * 3
+    assert len(made) == 1
+    path = user_cache() / "rooms-k1" / "a"
+    path.write_bytes(path.read_bytes().replace(b"value", b"wrong"))
+    assert kept("rooms", "k1", "a", make) == b"value"
+    assert len(made) == 2
+
+    other = user_cache() / "lines-k0"
+    other.mkdir()
+    for folder in (path.parent, other):
+        os.utime(folder, (0, 0))
+    kept("rooms", "k2", "a", make)
+    assert sorted(each.name for each in user_cache().iterdir()) == ["lines-k0", "rooms-k2"]
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(path.parents[1] / "rooms-k2" / "a"))  # a file
+    assert kept("rooms", "k3", "a", make) == b"value"

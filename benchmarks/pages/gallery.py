@@ -1,5 +1,5 @@
-"""docs/gallery.md and the README's picture: every type of thing with its name, rooms of each kind.
-
+"""docs/gallery.md and the README's picture: every type of thing with its name, rooms of each kind,
+and twelve rooms in both lights.
 
     python -m benchmarks.pages.gallery [--kinds Fridge,Mug --states --out sheet.png]
 
@@ -25,13 +25,13 @@ from benchmarks.harness.samples import sheet
 from er_gym.sim.actions import perform
 from er_gym.sim.agent import Agent
 from er_gym.sim.render.appearance import Appearance, compute_appearance
+from er_gym.sim.render.bake import pieces_of_look
 from er_gym.sim.render.camera import Camera
-from er_gym.sim.render.lighting import lit_colours
 from er_gym.sim.render.panda import core, geometry, rasteriser
 from er_gym.sim.render.scene_graph import scene_graph_of
 from er_gym.sim.render.shapes import SHAPES, build
 from er_gym.sim.scene import SCENE_NAMES, SCENE_NUMBERS, load_scene
-from er_gym.sim.settings import Settings
+from er_gym.sim.settings import FLAT, SOFT, Settings
 from er_gym.sim.world import World
 from er_gym.writing import (
     MARKDOWN_MARK,
@@ -46,6 +46,10 @@ _SIDE, _COLUMNS = 150, 10
 _ROOM = (640, 400)
 _ROOMS = {"kitchens": (1, 27), "living_rooms": (212, 227), "bedrooms": (301, 315),
           "bathrooms": (403, 413)}  # fmt: skip
+_LIT = {"kitchens": (5, 9, 22), "living_rooms": (207, 222, 228), "bedrooms": (301, 306, 318),
+        "bathrooms": (402, 407, 424)}  # fmt: skip
+"""Rooms that are shown in flat and in soft light."""
+_PAIR = (400, 250)
 _IN_FRONT = {"kitchens": 0, "living_rooms": 2, "bedrooms": 0, "bathrooms": 0}
 """The view of each kind of room that is in the README's picture."""
 _CUT = {"Sliced": "SliceObject", "Cracked": "BreakObject"}
@@ -107,13 +111,9 @@ def states(look: Appearance) -> Iterator[tuple[str, Appearance]]:
 
 def portrait(look: Appearance, side: int = _SIDE, yaw: float = 30.0) -> NDArray[np.uint8]:
     """(S, S, 3) a thing by itself, seen from its front, ``yaw`` degrees aside, and from above."""
-    parts = [
-        (m, p.vertices, lit_colours(m, p, 0.0, look.size[1], look.height), p.uv, p.triangles)
-        for m, p in build(look).items()
-    ]
     root = core().NodePath("portrait")
-    root.attachNewNode(geometry(parts, 1, look.kind))
-    corners = np.concatenate([vertices for _, vertices, _, _, _ in parts])
+    root.attachNewNode(geometry(pieces_of_look(look, 0.0), 1, look.kind))
+    corners = np.concatenate([patch.vertices for patch in build(look).values()])
     low, high = corners.min(axis=0), corners.max(axis=0)
     middle, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     away = max(radius / np.sin(np.radians(20)), 0.12 + radius)
@@ -131,6 +131,13 @@ def portrait(look: Appearance, side: int = _SIDE, yaw: float = 30.0) -> NDArray[
 
 def room_views(scene_name: str) -> list[NDArray[np.uint8]]:
     """The two views of a room that show the most different objects."""
+    world, cameras = _views(scene_name)
+    views = [replace(camera, width=_ROOM[0], height=_ROOM[1]) for camera in cameras]
+    return [scene_graph_of(scene_name).draw(world, camera).rgb for camera in views]
+
+
+def _views(scene_name: str) -> tuple[World, list[Camera]]:
+    """A room, and where its two views are taken from."""
     world = World.load(load_scene(scene_name), Settings())
     y = world.agent.position[1]
     found: list[tuple[int, int, float, Camera]] = []
@@ -143,8 +150,34 @@ def room_views(scene_name: str) -> list[NDArray[np.uint8]]:
     found.sort(key=lambda view: view[:3], reverse=True)
     first = found[0]
     second = next(view for view in found if abs((view[2] - first[2] + 180) % 360 - 180) > 80)
-    views = [replace(view[3], width=_ROOM[0], height=_ROOM[1]) for view in (first, second)]
-    return [scene_graph_of(scene_name).draw(world, camera).rgb for camera in views]
+    return world, [first[3], second[3]]
+
+
+def _in_both_lights(scene_name: str) -> NDArray[np.uint8]:
+    """A view of a room in flat light, and in soft light beside it."""
+    world, (camera, _) = _views(scene_name)
+    view = replace(camera, width=_PAIR[0], height=_PAIR[1])
+    pictures = [scene_graph_of(scene_name, light).draw(world, view).rgb for light in (FLAT, SOFT)]
+    return np.concatenate(pictures, axis=1)
+
+
+def _light_pages(images: Path) -> list[str]:
+    """The lines about light, and their pictures."""
+    lines = [
+        "## Light: twelve rooms, flat on the left and soft on the right",
+        "",
+        "Soft light comes from the windows (where there are none, from the ceiling) and from lamps",
+        'that are on, and things stand in soft shadows. `light="flat"` turns it off.',
+        "",
+    ]
+    for kind, numbers in track(_LIT.items(), "light", transient=True):
+        scenes = [f"FloorPlan{number}" for number in numbers]
+        page = Image.fromarray(np.concatenate([_in_both_lights(scene) for scene in scenes]))
+        name, title = f"gallery-light-{kind.replace('_', '-')}.jpg", kind.replace("_", " ")
+        write_picture(images / name, page, force=True, quality=80)
+        told = ", ".join(scenes)
+        lines += [f"![{title.capitalize()} in both lights: {told}](images/{name})", ""]
+    return lines
 
 
 def make_gallery() -> None:
@@ -185,6 +218,7 @@ def make_gallery() -> None:
         ]
     small = front.resize((1000, 625), Image.Resampling.LANCZOS)
     write_picture(images / "rooms.jpg", small, force=True, quality=88)
+    lines += _light_pages(images)
     write_output(DOCS / "gallery.md", MARKDOWN_MARK + "\n".join(lines), force=True)
 
 

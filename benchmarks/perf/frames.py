@@ -26,7 +26,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from functools import partial
-from itertools import cycle
+from itertools import cycle, product
 from pathlib import Path
 from typing import Any
 
@@ -43,17 +43,17 @@ from er_gym.rollout.cluster.actors import resident_memory
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.scene_graph import scene_graph_of
 from er_gym.sim.scene import SCENE_NAMES, load_scene
-from er_gym.sim.settings import Settings
+from er_gym.sim.settings import LIGHTS, SOFT, Settings
 from er_gym.sim.world import World
 
-SIZES = ((224, 224), (300, 300), (800, 450))
+SIZES = ((128, 128), (224, 224), (300, 300), (800, 450))
 SCENES = 10
 FIELD_OF_VIEW = 90.0
 HORIZONS = (-30.0, 0.0, 30.0)
 POSES = 20
 """Pictures in a row of one scene."""
-STEPS_WANTED = (400, 300, 120)
-MEMORY_WANTED = 350
+STEPS_WANTED = (1200, 700, 500, 160)
+MEMORY_WANTED = 300
 """Environment steps per second at each size, and megabytes that a process may take up."""
 SOAK_STEPS, SOAK_SCENES = 10_000, 200
 STEP = "environment: a step, rgb"
@@ -125,18 +125,20 @@ def cameras(world: World, size: tuple[int, int], random: np.random.Generator) ->
 class Pictures:
     """Draws one pose after the other in one scene after the other."""
 
-    def __init__(self, scenes: list[str], size: tuple[int, int], depth: bool) -> None:
+    def __init__(
+        self, scenes: list[str], size: tuple[int, int], depth: bool, light: str = SOFT
+    ) -> None:
         random = np.random.default_rng(0)
         worlds = [World.load(load_scene(name), Settings()) for name in scenes]
         self._poses = cycle(
             [(world, camera) for world in worlds for camera in cameras(world, size, random)]
         )
-        self._depth = depth
+        self._depth, self._light = depth, light
 
     def draw(self) -> None:
         """The next one."""
         world, camera = next(self._poses)
-        scene_graph_of(world.scene.name).draw(world, camera, self._depth)
+        scene_graph_of(world.scene.name, self._light).draw(world, camera, self._depth)
 
 
 def environment(scenes: list[str], size: tuple[int, int], device: str = "cpu") -> EmbodiedEnv:
@@ -266,9 +268,10 @@ def rates(scenes: list[str], rounds: int, seconds: float) -> list[FrameRate]:
         for size in SIZES:
             env = environment(scenes, size)
             stack.callback(env.close)
-            for depth in (False, True):
-                name = f"renderer: rgb, instances{', depth' if depth else ''}"
-                ways[name, size] = partial(per_second, Pictures(scenes, size, depth).draw, seconds)
+            for light, depth in product(LIGHTS, (False, True)):
+                name = f"renderer, {light} light: rgb, instances{', depth' if depth else ''}"
+                pictures = Pictures(scenes, size, depth, light)
+                ways[name, size] = partial(per_second, pictures.draw, seconds)
             ways[STEP, size] = partial(RandomPlayer([env], seed=0).steps_per_second, seconds)
             for renderer in mujoco_renderers:
                 ways[renderer.name, size] = partial(renderer.per_second, scenes, size, seconds)
@@ -286,7 +289,7 @@ def soak() -> list[Memory]:
     """How memory grows over many steps in a few scenes, and over changes between all scenes."""
     random = np.random.default_rng(0)
     few = choose_scenes(str(SCENES))
-    env = environment(list(SCENE_NAMES), SIZES[1])
+    env = environment(list(SCENE_NAMES), SIZES[2])
 
     def play(scenes: list[str], steps: int) -> float:
         for name in progress(scenes, "soak"):

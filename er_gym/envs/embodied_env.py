@@ -30,7 +30,7 @@ from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.envs.window import Window
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import types_named
-from er_gym.thor import BACKENDS, RENDER_DEVICES, check_size, make_controller
+from er_gym.thor import BACKENDS, LIGHTS, RENDER_DEVICES, check_size, make_controller
 
 _NOT_BEGUN, _CLOSED = "no episode has begun", "the environment is closed"
 _BROKEN_OFF = "the last reset or step was broken off by an error"
@@ -142,6 +142,8 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     - ``step_penalty``, ``illegal_penalty``: 0 or more, see Rewards.
     - ``render_device``: the device that the embedded engine draws with, the same for all
       environments of a process: ``"cpu"``, or ``"gpu"`` on a machine that has one with EGL.
+    - ``light``: that the embedded engine draws in: ``"soft"``, from windows and lamps and with soft
+      shadows, or ``"flat"``, the same everywhere.
     - ``render_mode``: what :meth:`render` returns: ``"rgb_array"``, the agent's view as (height,
       width, 3) uint8; ``"ansi"``, the room, the pose, what the agent sees and holds and the last
       feedback, in words; ``"human"``, nothing: ``reset`` and ``step`` show a window (extra
@@ -176,6 +178,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         illegal_penalty: float = 0.0,
         annotate: bool = False,
         render_device: str = "cpu",
+        light: str = "soft",
         render_mode: str | None = None,
         faults: Faults = 0.0,
     ) -> None:
@@ -184,7 +187,7 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             width=width, height=height, field_of_view=field_of_view, grid_size=grid_size,
             visibility_distance=visibility_distance, instances=instances, protocol=protocol,
             max_steps=max_steps, step_penalty=step_penalty, illegal_penalty=illegal_penalty,
-            annotate=annotate, render_device=render_device, render_mode=render_mode,
+            annotate=annotate, render_device=render_device, light=light, render_mode=render_mode,
             faults=faults,
         )  # fmt: skip
         # Check every argument before anything is started.
@@ -236,8 +239,9 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             **{name: on for sensor in sensors for name, on in SENSORS[sensor].items()},
         }
         one_of("render_device", render_device, RENDER_DEVICES)
+        one_of("light", light, LIGHTS)
         if sensors and backend == "embedded":
-            self._controller_arguments["render_device"] = render_device
+            self._controller_arguments.update(render_device=render_device, light=light)
         self._generator: EpisodeSource | None = None
         self._generates = isinstance(episode_source, str) and episode_source == GENERATE
         self._source = self._resolve_source(episode_source)

@@ -15,6 +15,7 @@ from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.sim.object_metadata import writable_objects
 from er_gym.sim.protocol import rgba
 from er_gym.sim.render.view import View
+from er_gym.sim.settings import SOFT
 from er_gym.sim.world import World
 
 import_client()
@@ -75,9 +76,9 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
 
     server_type = "EMBEDDED"
 
-    def __init__(self, width: int, height: int, **kwargs: Any) -> None:
+    def __init__(self, width: int, height: int, *, light: str = SOFT, **kwargs: Any) -> None:
         super().__init__(width, height, **kwargs)
-        self.engine = Engine(width, height, EventMetadata)
+        self.engine = Engine(width, height, EventMetadata, light)
         self._event: ai2thor.server.Event | None = None
         # The client adjusts the resolution only if it believes that a player process is there.
         self.unity_proc = self
@@ -140,14 +141,16 @@ class EmbeddedController(ai2thor.controller.Controller):  # type: ignore[misc]  
 
     It takes the official controller's arguments (``scene``, ``width``, ``height``, ``gridSize``,
     ``visibilityDistance``, ``fieldOfView``, ``renderDepthImage`` …), except for those that choose a
-    Unity build. It behaves as the official one does: ``step`` and ``reset`` return an
-    ``ai2thor.server.Event``, and invalid calls raise ValueError.
+    Unity build, and ``light``, which is ``"soft"`` (windows, lamps and soft shadows) or ``"flat"``
+    (the same light everywhere). It behaves as the official one does: ``step`` and ``reset`` return
+    an ``ai2thor.server.Event``, and invalid calls raise ValueError.
 
     Raises:
         TypeError: an argument chooses a Unity build.
+        ValueError: there is no such light.
     """
 
-    def __init__(self, **arguments: Any) -> None:
+    def __init__(self, *, light: str = SOFT, **arguments: Any) -> None:
         taken = sorted(_TAKEN & arguments.keys())
         if taken:
             raise TypeError(
@@ -155,6 +158,7 @@ class EmbeddedController(ai2thor.controller.Controller):  # type: ignore[misc]  
                 "make_controller(backend='unity', …) does"
             )
         arguments.setdefault("scene", "FloorPlan1")
+        self._light = light
         super().__init__(server_class=EmbeddedServer, start_unity=False, **arguments)
 
     server: EmbeddedServer | None
@@ -231,4 +235,5 @@ class EmbeddedController(ai2thor.controller.Controller):  # type: ignore[misc]  
                 timeout=self.server_timeout,
                 depth_format=self.depth_format,
                 add_depth_noise=self.add_depth_noise,
+                light=self._light,
             )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple
 from weakref import ReferenceType, ref
 
@@ -13,7 +12,7 @@ from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.sim.metadata import metadata
 from er_gym.sim.render.view import View, draw, with_flags
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError, load_scene
-from er_gym.sim.settings import Settings
+from er_gym.sim.settings import LIGHTS, SOFT, Settings
 from er_gym.sim.size import check_size
 from er_gym.sim.world import World
 
@@ -47,9 +46,11 @@ class Engine:
     Args:
         width, height: size of frames, pixels.
         metadata_kind: the class of the metadata that :meth:`step` returns.
+        light: that frames are drawn in, one of :data:`~er_gym.sim.settings.LIGHTS`.
 
     Raises:
-        ValueError: no frame is of that size, see :func:`~er_gym.sim.size.check_size`.
+        ValueError: no frame is of that size, see :func:`~er_gym.sim.size.check_size`; or there is
+            no such light.
     """
 
     def __init__(
@@ -57,11 +58,15 @@ class Engine:
         width: int = 300,
         height: int = 300,
         metadata_kind: type[LazyMetadata] = LazyMetadata,
+        light: str = SOFT,
     ) -> None:
         check_size(width, height)
+        if light not in LIGHTS:
+            raise ValueError(f"unknown light {light!r}; choose one of: {', '.join(LIGHTS)}")
         self._kind = metadata_kind
         self._last: ReferenceType[LazyMetadata] | None = None
-        self.world = World.load(load_scene(SCENE_NAMES[0]), Settings(width=width, height=height))
+        settings = Settings(width=width, height=height, light=light)
+        self.world = World.load(load_scene(SCENE_NAMES[0]), settings)
 
     def step(self, request: Mapping[str, Any]) -> tuple[LazyMetadata, View | None]:
         """Do one action, given as the AI2-THOR client sends it.
@@ -100,5 +105,6 @@ class Engine:
             scene = load_scene(name)
         except UnknownSceneError as error:
             raise ActionFailed(str(error)) from None
-        size = self.world.settings
-        self.world = World.load(scene, replace(Settings(), width=size.width, height=size.height))
+        now = self.world.settings
+        fresh = Settings(width=now.width, height=now.height, light=now.light)
+        self.world = World.load(scene, fresh)

@@ -180,7 +180,12 @@ def load_scene(name: str) -> Scene:
 
 @cache
 def _load_packaged(name: str) -> Scene:
-    return read_scene(_SCENES / f"{name}.npz")
+    return read_scene(scene_file(name))
+
+
+def scene_file(name: str) -> Path:
+    """The file of a packaged scene, one of :data:`SCENE_NAMES`."""
+    return _SCENES / f"{name}.npz"
 
 
 def write_scene(path: Path, scene: Scene) -> None:

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+SOFT, FLAT = "soft", "flat"
+LIGHTS = (SOFT, FLAT)
+"""The lights that pictures are drawn in: light from windows and lamps with soft shadows, or the
+same light everywhere."""
+
 
 @dataclass(frozen=True)
 class Settings:
-    """What ``Initialize`` sets; lengths in metres, angles in degrees."""
+    """What ``Initialize`` sets; lengths in metres, angles in degrees.
+
+    The size of pictures and the light come from the engine, and no action changes the light.
+    """
 
     grid_size: float = 0.25
     snap_to_grid: bool = True
@@ -19,6 +27,7 @@ class Settings:
     render_depth: bool = False
     render_instances: bool = False
     render_classes: bool = False
+    light: str = SOFT
 
     @property
     def draws_colors(self) -> bool:

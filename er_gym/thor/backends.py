@@ -19,6 +19,8 @@ class BackendError(RuntimeError):
 RENDER_DEVICES = ("cpu", "gpu")
 """The devices that the embedded engine can draw with. The engine, which is too heavy to import
 here, has the same list; a test compares them."""
+LIGHTS = ("soft", "flat")
+"""The lights that the embedded engine draws in; the same holds for this list."""
 
 
 def _embedded(arguments: dict[str, Any]) -> Controller:
@@ -73,7 +75,8 @@ def make_controller(backend: str = "embedded", **arguments: Any) -> Controller:
         backend: "embedded" (our engine, in this process) or "unity" (the real simulator;
             CloudRendering when there is no display).
         **arguments: the arguments of ``ai2thor.controller.Controller``. The embedded engine also
-            takes ``render_device``: "cpu" or "gpu", the same for the whole process.
+            takes ``render_device``: "cpu" or "gpu", the same for the whole process; and ``light``:
+            "soft", from windows and lamps and with soft shadows, or "flat", the same everywhere.
 
     Raises:
         ValueError: the backend is unknown.

@@ -9,7 +9,7 @@ import threading
 from hashlib import sha256
 from pathlib import Path
 
-from er_gym.writing import write_atomic
+from er_gym.writing import user_cache, write_atomic
 
 EXECUTABLE = 0o755
 _START = Path(__file__).with_name("start_player.py")
@@ -24,8 +24,7 @@ def thor_executable() -> str:
         path as a shell would, so a path with spaces is quoted. If the cache cannot be written, it
         is the command that the launcher would run.
     """
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
-    return executable_in(cache / "er-gym")
+    return executable_in(user_cache())
 
 
 def executable_in(cache: Path) -> str:

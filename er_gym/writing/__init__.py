@@ -28,6 +28,7 @@ from er_gym.writing.atomic import (
     write_atomic,
     write_new,
 )
+from er_gym.writing.cache import kept, user_cache
 from er_gym.writing.folders import check_folder, whole_folder
 from er_gym.writing.names import OutsideFolder, file_stem, inside, place_file, writable
 from er_gym.writing.outputs import (
@@ -53,10 +54,12 @@ __all__ = [
     "file_stem",
     "inside",
     "is_ours",
+    "kept",
     "make_folder",
     "picture_format",
     "place_file",
     "replaced",
+    "user_cache",
     "whole_folder",
     "writable",
     "write_atomic",

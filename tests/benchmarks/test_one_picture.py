@@ -25,8 +25,8 @@ def test_states_look_the_same_however_they_are_reached() -> None:
 def test_a_pixel_that_depends_on_the_past_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     draw, drawn = Rasteriser.draw, count()
 
-    def spoiled(self: Rasteriser, *arguments: Any) -> Frames:
-        frames = draw(self, *arguments)
+    def spoiled(self: Rasteriser, *arguments: Any, **named: Any) -> Frames:
+        frames = draw(self, *arguments, **named)
         frames.rgb[7, 9, 0] = next(drawn) % 251
         return frames
 

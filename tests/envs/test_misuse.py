@@ -16,8 +16,9 @@ from er_gym.envs.actions import ACTIONS
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.errors import ResetNeeded
 from er_gym.envs.wrappers import InstructionEmbedding, KeyActionShaping
+from er_gym.sim import settings
 from er_gym.sim.render.panda import DEVICES
-from er_gym.thor import RENDER_DEVICES
+from er_gym.thor import LIGHTS, RENDER_DEVICES
 
 ASKED: dict[str, Callable[[Any], object]] = {
     "step": lambda env: env.step(0),
@@ -68,6 +69,7 @@ def test_wrappers_and_vectors_ask_as_well() -> None:
         ("visibility_distance", None, "visibility_distance is None; give a number above 0"),
         ("annotate", 1, "annotate is 1; give True or False"),
         ("render_device", "tpu", "unknown render_device 'tpu'; choose one of: cpu, gpu"),
+        ("light", "dim", "unknown light 'dim'; choose one of: soft, flat"),
         ("backend", ["unity"], "unknown backend .*; choose one of: embedded, unity"),
         ("protocol", None, "unknown protocol None; choose one of: default, paper"),
         ("obs_mode", 3, "unknown obs_mode 3; join any of"),
@@ -79,8 +81,9 @@ def test_invalid_arguments_of_an_environment(name: str, value: Any, allowed: str
         EmbodiedEnv(**{name: value})
 
 
-def test_the_devices_are_those_of_the_engine() -> None:
+def test_the_devices_and_lights_are_those_of_the_engine() -> None:
     assert tuple(DEVICES) == RENDER_DEVICES
+    assert settings.LIGHTS == LIGHTS
 
 
 def test_a_reset_that_is_refused_leaves_the_episode_as_it_was() -> None:

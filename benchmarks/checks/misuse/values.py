@@ -100,6 +100,7 @@ _WRONG: dict[str, tuple[Any, ...]] = {
     "task_type": ("cleaning", "", 3, ["cleaning"], [["Search"]], b"single_search"),
     "annotate": (1, "yes", None, 0.0),
     "render_device": ("tpu", "", None, 3, ["cpu"]),
+    "light": ("dim", "", None, 3, ["flat"]),
     "render_mode": ("svg", "", 3, ["rgb_array"], True),
     "episode_source": (
         None, 3, "", "no suite", "no/such/file.jsonl", Path("nowhere.json"), {"a": 1}, [1, 2],

@@ -13,11 +13,13 @@ class Material:
         texture: a name of :data:`er_gym.sim.render.textures.TEXTURES`, None for none.
         glows: whether it is drawn without shading, as screens, lamps and windows are.
         glass: whether it is transparent; it hides nothing and belongs to no instance.
+        veil: whether it is a shadow: glass that is as dark as the alpha of its colours.
     """
 
     texture: str | None = None
     glows: bool = False
     glass: bool = False
+    veil: bool = False
 
 
 MATERIALS: dict[str, Material] = {
@@ -37,5 +39,6 @@ MATERIALS: dict[str, Material] = {
         for name in ("sky", "screen", "desktop", "phone", "mirror", "flame", "digits")
     },
     **{f"picture{k}": Material(f"picture{k}") for k in range(8)},
+    "veil": Material(glass=True, veil=True),
 }  # fmt: skip
 """The materials by name; ``picture0`` to ``picture7`` are paintings and posters."""

@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.libx11 import provide_libx11
 from er_gym.sim.render.materials import MATERIALS
-from er_gym.sim.render.textures import texture
+from er_gym.sim.render.pieces import Piece
+from er_gym.sim.render.textures import texture, veil
 
 NEAR, FAR = 0.1, 40.0
 """The near and the far plane, metres from the camera."""
@@ -45,16 +46,18 @@ notify-level error
 textures-power-2 down
 garbage-collect-states 0
 uniquify-transforms 0
+bounds-type box
 transform-cache 0
 """
-"""Panda would otherwise merge transforms that are nearly equal and keep the older one."""
+"""Panda would otherwise merge transforms that are nearly equal and keep the older one, and find
+fewer things to be out of sight, since most are no balls."""
 DRAWING = RLock()
 """The lock for making, changing or drawing a scene graph: all threads share Panda's objects."""
 _GPU_SHIFT = 0.25
 """How far right and down OpenGL's pictures lie of the software rasteriser's, pixels. It rounds
 corners to whole pixels; this shift, found by trying, makes most pixels show the same instance."""
 _DEPTH_STEPS = float(1 << 20)
-_VERTEX = np.dtype([("at", "<f4", 3), ("colour", "u1", 4), ("uv", "<f4", 2)])
+_NO_IDS = np.empty((0, 0), np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +66,7 @@ class Frames:
 
     Attributes:
         rgb: (H, W, 3) uint8.
-        ids: (H, W) uint8 number of the instance, 0 for none.
+        ids: (H, W) uint8 number of the instance, 0 for none; empty unless asked for.
         depth: (H, W) float32 metres along the view axis, None unless asked for.
     """
 
@@ -160,12 +163,31 @@ class Rasteriser:
         self._lens = p3d.PerspectiveLens()
         self._lens.setNearFar(NEAR, FAR)
         self._camera = p3d.NodePath(p3d.Camera("camera", self._lens))
-        region = self._buffer.makeDisplayRegion()
-        region.setCamera(self._camera)
+        self._room = self._buffer.makeDisplayRegion()
+        self._room.setCamera(self._camera)
+        # Shadows have a pass of their own, since they write depths: the software rasteriser draws
+        # the pixels on the edge between two triangles with both, and would darken them twice.
+        self._veils = p3d.NodePath(p3d.Camera("veils", self._lens))
+        self._over = self._buffer.makeDisplayRegion()
+        self._over.setSort(1)
+        self._over.setCamera(self._veils)
         self._show_depth = p3d.ConfigVariableBool("td-show-zbuffer", False)
 
-    def draw(self, root: Any, camera: Camera, depth: bool = False) -> Frames:
-        """The images of a camera in a scene graph; the caller owns the arrays."""
+    def draw(
+        self,
+        root: Any,
+        camera: Camera,
+        depth: bool = False,
+        *,
+        ids: bool = True,
+        veils: Any = None,
+    ) -> Frames:
+        """The images of a camera in a scene graph; the caller owns the arrays.
+
+        Args:
+            veils: a graph of shadows to draw over it; they have neither an instance nor a depth.
+                With both these and depths, everything is drawn twice.
+        """
         with DRAWING:
             width, height = camera.width, camera.height
             if (width, height) != self._size:
@@ -176,22 +198,34 @@ class Rasteriser:
             half = tan(radians(fov) / 2)
             self._lens.setFov(2 * degrees(atan(half * width / height)), fov)
             x, y, z = (float(value) for value in camera.position)
-            self._camera.reparentTo(root)
-            self._camera.setPos(x, z, y)
-            self._camera.setHpr(-camera.yaw, -camera.horizon, -camera.roll)
+            # Not a node of the graph: moving it there would compute the graph's bounds again.
+            self._camera.node().setScene(root)
+            self._camera.setPosHpr(x, z, y, -camera.yaw, -camera.horizon, -camera.roll)
+            self._over.setActive(False)
+            measured = None
             self._show_depth.setValue(depth)
             if self._steps is not None:
                 shift, film = _GPU_SHIFT, self._lens.getFilmSize()
                 self._lens.setFilmOffset(shift * film[0] / width, -shift * film[1] / height)
-                if depth:
+            if depth:
+                if self._steps is not None:
                     self._buffer.triggerCopy()
-            self._engine.renderFrame()
+                self._engine.renderFrame()
+                measured = self._depth(width, height)
+                self._show_depth.setValue(False)
+            if veils is not None:
+                self._veils.node().setScene(veils)
+                self._veils.setTransform(self._camera.getTransform())
+                self._over.setActive(True)
+            if veils is not None or not depth:
+                self._engine.renderFrame()
             pixels = np.frombuffer(self._picture.getRamImage(), np.uint8)
             pixels = pixels.reshape(height, width, 4)[::-1]
-            ids, rgb = pixels[..., 3].copy(), np.empty((height, width, 3), dtype=np.uint8)
+            rgb = np.empty((height, width, 3), dtype=np.uint8)
             for channel in range(3):  # faster than all channels at once
                 rgb[..., channel] = pixels[..., 2 - channel]
-            return Frames(rgb, ids, self._depth(width, height) if depth else None)
+            seen = pixels[..., 3].copy() if ids else _NO_IDS
+            return Frames(rgb, seen, measured)
 
     def _depth(self, width: int, height: int) -> NDArray[np.float32]:
         if self._steps is None:  # 0 is far, 2**20 is near
@@ -214,11 +248,24 @@ def rasteriser() -> Rasteriser:
 
 @cache
 def _texture(name: str) -> Any:
-    p3d, picture = core(), texture(name)
+    return _uploaded(name, texture(name), core().Texture.FRgb)
+
+
+@cache
+def _veil() -> Any:
+    alpha = veil()
+    white = np.full((*alpha.shape, 3), 255, np.uint8)
+    return _uploaded("veil", np.dstack([alpha, white]), core().Texture.FRgba)
+
+
+def _uploaded(name: str, picture: NDArray[np.uint8], form: int) -> Any:
+    """A texture of a picture, top row first; the channels are red, green and blue, or alpha first.
+
+    Panda3D wants the bottom row first and the channels the other way round.
+    """
+    p3d = core()
     found = p3d.Texture(name)
-    found.setup2dTexture(
-        picture.shape[1], picture.shape[0], p3d.Texture.TUnsignedByte, p3d.Texture.FRgb
-    )
+    found.setup2dTexture(picture.shape[1], picture.shape[0], p3d.Texture.TUnsignedByte, form)
     found.setRamImage(np.ascontiguousarray(picture[::-1, :, ::-1]).tobytes())
     found.setMinfilter(p3d.SamplerState.FTNearestMipmapNearest)
     found.setMagfilter(p3d.SamplerState.FTNearest)
@@ -229,6 +276,15 @@ def _texture(name: str) -> Any:
 def state(material: str) -> Any:
     """The render state of a material."""
     p3d, surface = core(), MATERIALS[material]
+    # Draw one material after another, and within each in the order of the graph.
+    order = p3d.CullBinAttrib.make("opaque", list(MATERIALS).index(material))
+    if surface.veil:
+        return p3d.RenderState.make(
+            p3d.TransparencyAttrib.make(p3d.TransparencyAttrib.MAlpha),
+            p3d.ColorWriteAttrib.make(7),
+            p3d.TextureAttrib.make(_veil()),
+            p3d.ColorAttrib.makeVertex(),
+        ).addAttrib(order)
     if surface.glass:
         return p3d.RenderState.make(
             p3d.TransparencyAttrib.make(p3d.TransparencyAttrib.MAlpha),
@@ -237,50 +293,34 @@ def state(material: str) -> Any:
             p3d.ColorAttrib.makeFlat(p3d.LColor(0.75, 0.9, 0.95, 0.22)),
         )
     colours = p3d.ColorAttrib.makeVertex()
-    # Draw one material after another, and within each in the order of the graph.
-    order = p3d.CullBinAttrib.make("opaque", list(MATERIALS).index(material))
     if surface.texture is None:
         return p3d.RenderState.make(colours, order)
     return p3d.RenderState.make(p3d.TextureAttrib.make(_texture(surface.texture)), colours, order)
 
 
-def geometry(
-    parts: Iterable[
-        tuple[str, NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]
-    ],
-    number: int,
-    name: str,
-) -> Any:
-    """A node that draws triangles as instance ``number`` (0: none).
-
-    Args:
-        parts: for each material its name, vertices (V, 3), colours (V, 3), uv (V, 2) and triangles
-            (F, 3).
-    """
+def geometry(pieces: Iterable[Piece], number: int, name: str) -> Any:
+    """A node that draws pieces as instance ``number`` (0: none)."""
     if number > MOST_INSTANCES:
         raise ValueError(f"there can be {MOST_INSTANCES} instances, not {number}")
     p3d = core()
     node = p3d.GeomNode(name)
-    for material, at, colours, uv, triangles in parts:
+    for piece in pieces:
         # With a texture, the software rasteriser lowers each alpha by 1.
-        textured = MATERIALS[material].texture is not None and _device() == "cpu"
-        rows = np.empty(len(at), dtype=_VERTEX)
-        rows["at"] = at[:, [0, 2, 1]]
-        rows["colour"][:, :3] = np.clip(colours, 0.0, 1.0) * 255 + 0.5
-        rows["colour"][:, 3] = number + (1 if textured and number else 0)
-        rows["uv"] = uv
+        textured = MATERIALS[piece.material].texture is not None and _device() == "cpu"
+        rows = piece.vertices.copy()
+        if not MATERIALS[piece.material].veil:
+            rows["colour"][:, 3] = number + (1 if textured and number else 0)
         data = p3d.GeomVertexData(name, p3d.GeomVertexFormat.getV3c4t2(), p3d.Geom.UHStatic)
         data.uncleanSetNumRows(len(rows))
         data.modifyArrayHandle(0).copyDataFrom(rows.tobytes())
-        wide = len(rows) >= 65536
+        wide = piece.triangles.dtype == np.uint32
         primitive = p3d.GeomTriangles(p3d.Geom.UHStatic)
         primitive.setIndexType(p3d.Geom.NTUint32 if wide else p3d.Geom.NTUint16)
         # Panda's frame is right-handed, so mirrored triangles go round the other way.
-        index = np.ascontiguousarray(triangles, dtype=np.uint32 if wide else np.uint16)
         array = primitive.modifyVertices()
-        array.uncleanSetNumRows(index.size)
-        array.modifyHandle().copyDataFrom(index.tobytes())
+        array.uncleanSetNumRows(piece.triangles.size)
+        array.modifyHandle().copyDataFrom(piece.triangles.tobytes())
         geom = p3d.Geom(data)
         geom.addPrimitive(primitive)
-        node.addGeom(geom, state(material))
+        node.addGeom(geom, state(piece.material))
     return node

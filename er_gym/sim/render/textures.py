@@ -26,6 +26,8 @@ from er_gym.sim.render.texture_drawing import (
     rectangle,
     stretched,
 )
+from er_gym.sim.source_key import source_key
+from er_gym.writing import kept
 
 SURFACES: dict[str, Painter] = {}
 """Textures of surfaces: they are nearly white, and they tile."""
@@ -39,6 +41,22 @@ def _surface(function: Painter) -> Painter:
 @cache
 def texture(name: str) -> NDArray[np.uint8]:
     """(S, S, 3) a texture by name, top row first; S is a power of two."""
+    drawn = kept("render", source_key(), f"{name}.texture", lambda: _drawn(name).tobytes())
+    return np.frombuffer(drawn, np.uint8).reshape(SIDE, SIDE, 3)
+
+
+VEIL_EDGE = 0.4
+"""How far inside the veil's texture its shadow is whole."""
+
+
+def veil() -> NDArray[np.uint8]:
+    """(S, S) how dark a soft shadow is: whole in the middle, and none at the edge."""
+    out = np.maximum(VEIL_EDGE - np.minimum(np.stack([X, Y]), 1.0 - np.stack([X, Y])), 0.0)
+    away = np.clip(np.hypot(*out) / (VEIL_EDGE - 1.0 / SIDE), 0.0, 1.0)
+    return np.asarray((1.0 - away) ** 2 * 255 + 0.5, dtype=np.uint8)
+
+
+def _drawn(name: str) -> NDArray[np.uint8]:
     seed = int.from_bytes(blake2b(name.encode(), digest_size=8).digest(), "big")
     picture = TEXTURES[name](np.random.default_rng(seed))
     if picture.ndim == 2:

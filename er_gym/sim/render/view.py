@@ -67,8 +67,10 @@ _VIEW: CacheKey[_Kept] = CacheKey("view")
 def with_flags(settings: Settings, request: Mapping[str, Any]) -> Settings:
     """The settings, with the images that one action asks for in addition to those of
     ``Initialize``."""
-    wanted = {name: True for flag, name in _FLAGS.items() if request.get(flag) is True}
-    return replace(settings, **wanted) if wanted else settings
+    asked: dict[str, Any] = {
+        name: True for flag, name in _FLAGS.items() if request.get(flag) is True
+    }
+    return replace(settings, **asked) if asked else settings
 
 
 def draw(world: World) -> View:
@@ -110,7 +112,7 @@ def _cameras(world: World) -> Iterator[Camera]:
 
 def _draw(world: World, camera: Camera) -> View:
     settings = world.settings
-    frames = _frames(world, camera, settings.render_depth)
+    frames = _frames(world, camera, settings.render_depth, ids=settings.draws_colors)
     view = View(
         frames.rgb,
         frames.depth,
@@ -124,12 +126,12 @@ def _draw(world: World, camera: Camera) -> View:
     return view
 
 
-def _frames(world: World, camera: Camera, depth: bool = False) -> Frames:
-    from er_gym.sim.render.scene_graph import (
-        scene_graph_of,
-    )  # most worlds are never drawn
+def _frames(world: World, camera: Camera, depth: bool = False, *, ids: bool = True) -> Frames:
+    # Most worlds are never drawn.
+    from er_gym.sim.render.scene_graph import scene_graph_of
 
-    return scene_graph_of(world.scene.name).draw(world, camera, depth)
+    graph = scene_graph_of(world.scene.name, world.settings.light)
+    return graph.draw(world, camera, depth, ids=ids)
 
 
 def _colored(frames: Frames, names: Sequence[str]) -> NDArray[np.uint8]:

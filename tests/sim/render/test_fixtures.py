@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.fixtures import fixtures
 from er_gym.sim.render.panda import geometry
+from er_gym.sim.render.pieces import pieces_of
 from er_gym.sim.render.scene_graph import SceneGraph
 from er_gym.sim.scene import SCENE_NAMES, SCENE_NUMBERS, load_scene
 from er_gym.sim.settings import Settings
@@ -34,8 +35,7 @@ def triangles(name: str) -> NDArray[np.float32]:
 
 
 def attach(graph: Any, name: str) -> None:
-    parts = [(m, p.vertices, p.colours, p.uv, p.triangles) for m, p in fixtures(name).items()]
-    graph._root.attachNewNode(geometry(parts, 0, "fixtures"))
+    graph._root.attachNewNode(geometry(pieces_of(fixtures(name)), 0, "fixtures"))
 
 
 def views(world: World) -> list[Camera]:

@@ -21,12 +21,12 @@ BEFORE
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.panda import core, geometry, rasteriser
 from er_gym.sim.render.mesh import Mesh
+from er_gym.sim.render.pieces import pieces_of
 assert core().__file__.startswith(sys.argv[1]), core().__file__
 mesh = Mesh()
 mesh.box((0, 0, 3), (1, 1, 1), (1, 0, 0))
 root = core().NodePath("root")
-parts = [(m, p.vertices, p.colours, p.uv, p.triangles) for m, p in mesh.patches().items()]
-root.attachNewNode(geometry(parts, 7, "box"))
+root.attachNewNode(geometry(pieces_of(mesh.patches()), 7, "box"))
 frames = rasteriser().draw(root, Camera((0, 0, 0), 0, 0, 90, 64, 64))
 assert frames.ids[32, 32] == 7 and frames.rgb[32, 32].tolist() == [255, 0, 0]
 mapped = {line.split()[-1] for line in open("/proc/self/maps") if "libp3tinydisplay" in line}

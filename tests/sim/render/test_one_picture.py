@@ -10,7 +10,8 @@ from er_gym.sim.render.camera import Camera
 from er_gym.sim.render.materials import MATERIALS
 from er_gym.sim.render.mesh import Mesh
 from er_gym.sim.render.panda import core, geometry, rasteriser
-from er_gym.sim.render.scene_graph import scene_graph_of
+from er_gym.sim.render.pieces import pieces_of
+from er_gym.sim.render.scene_graph import SceneGraph, scene_graph_of
 from er_gym.sim.scene import SCENE_NAMES
 from er_gym.sim.world import World
 from tests.sim.render.test_scene_graph import camera_of, do, one, stand, world_of
@@ -19,8 +20,7 @@ from tests.sim.render.test_scene_graph import camera_of, do, one, stand, world_o
 def _panel(number: int, material: str = "plain") -> object:
     mesh = Mesh()
     mesh.panel((0.0, 0.0, 1.0), (4.0, 4.0), (1.0, 1.0, 1.0), material, facing="z")
-    parts = [(m, p.vertices, p.colours, p.uv, p.triangles) for m, p in mesh.patches().items()]
-    return geometry(parts, number, f"panel {number}")
+    return geometry(pieces_of(mesh.patches()), number, f"panel {number}")
 
 
 def test_of_surfaces_at_the_same_depth_the_first_in_order_is_seen() -> None:
@@ -122,3 +122,20 @@ def test_what_lies_in_a_shut_box_is_not_drawn_when_the_hand_moves() -> None:
     scene_graph_of(scene).draw(world, camera)
     assert small not in scene_graph_of(scene)._placed
     assert box in scene_graph_of(scene)._placed
+
+
+def test_a_graph_that_has_shown_other_worlds_shows_this_one_as_a_new_graph_does() -> None:
+    """Only what has changed in a world, or had in the one before, is looked at."""
+    name, worlds = "FloorPlan1", [world_of("FloorPlan1") for _ in range(3)]
+    plain, opened, moved = worlds
+    do(opened, "OpenObject", objectId=opened.object_ids[one(opened, "Fridge")], forceAction=True)
+    do(opened, "SliceObject", objectId=opened.object_ids[one(opened, "Bread")], forceAction=True)
+    apple = moved.object_ids[one(moved, "Apple")]
+    do(moved, "PickupObject", objectId=apple, forceAction=True)
+    for each in worlds:
+        stand(each, -1.0, 1.0, 270.0, 20.0)
+    kept = SceneGraph(name)
+    for each in (plain, opened, moved, plain, moved, opened, plain):
+        shown, fresh = (graph.draw(each, camera_of(each)) for graph in (kept, SceneGraph(name)))
+        assert np.array_equal(shown.rgb, fresh.rgb)
+        assert np.array_equal(shown.ids, fresh.ids)

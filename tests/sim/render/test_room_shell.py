@@ -13,6 +13,7 @@ from er_gym.sim.render.floor_plan import floor_plan
 from er_gym.sim.render.mesh import Mesh
 from er_gym.sim.render.panda import core, geometry, rasteriser
 from er_gym.sim.render.patch import Patch
+from er_gym.sim.render.pieces import pieces_of
 from er_gym.sim.render.room_shell import room_shell
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 from er_gym.sim.settings import Settings
@@ -24,8 +25,7 @@ FLOOR = 250
 
 
 def drawn(root: Any, patches: dict[str, Patch], number: int, name: str) -> Any:
-    parts = [(m, p.vertices, p.colours, p.uv, p.triangles) for m, p in patches.items()]
-    return root.attachNewNode(geometry(parts, number, name))
+    return root.attachNewNode(geometry(pieces_of(patches), number, name))
 
 
 def boxes(world: World, i: int) -> dict[str, Patch]:

@@ -109,7 +109,7 @@ def test_an_interrupted_picture_spoils_no_other(
     pictures = [graph.draw(world, camera_of(world)).rgb for world in (plain, changed)]
     assert (pictures[0] != pictures[1]).any()
 
-    for name, count in (("appearance_of", 0), ("appearance_of", 12), ("rasteriser", 0)):
+    for name, count in (("_put", 0), ("_put", 1), ("rasteriser", 0)):
         with monkeypatch.context() as patch:
             patch.setattr(scene_graph, name, _interrupted(getattr(scene_graph, name), error, count))
             with pytest.raises(error):

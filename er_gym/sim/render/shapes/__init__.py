@@ -25,8 +25,15 @@ from er_gym.sim.render.shapes import (  # noqa: F401  (each registers its shapes
     textiles,
     toiletries,
 )
-from er_gym.sim.render.shapes.registry import SHAPES, UNSEEN, build, load_added, without_shape
+from er_gym.sim.render.shapes.registry import (
+    SHAPES,
+    UNSEEN,
+    build,
+    is_added,
+    load_added,
+    without_shape,
+)
 
-__all__ = ["SHAPES", "UNSEEN", "build", "without_shape"]
+__all__ = ["SHAPES", "UNSEEN", "build", "is_added", "without_shape"]
 
 load_added()

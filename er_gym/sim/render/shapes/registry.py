@@ -20,6 +20,7 @@ SHAPES: dict[str, Shape] = {}
 UNSEEN = frozenset({"Floor"})
 """Types that are drawn with the room and not as objects."""
 _KEPT = 256
+_OWN = __name__.rpartition(".")[0]
 
 
 def shape(*kinds: str) -> Callable[[Shape], Shape]:
@@ -56,6 +57,11 @@ def build(appearance: Appearance) -> dict[str, Patch]:
     """The triangles of an object by material; a type without a shape is drawn as a plain box."""
     function = SHAPES.get(appearance.kind, _plain_box)
     return function(appearance).patches()
+
+
+def is_added(kind: str) -> bool:
+    """Whether the shape of an object type is not er-gym's own."""
+    return not SHAPES.get(kind, _plain_box).__module__.startswith(_OWN)
 
 
 def _plain_box(appearance: Appearance) -> Mesh:
