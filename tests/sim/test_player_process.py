@@ -440,7 +440,8 @@ def test_its_parents_death_ends_it(when):
 
 
 def test_a_player_that_is_killed_is_an_error_of_the_client():
-    controller = launch(server_timeout=1.0)
+    controller = launch()
+    controller.server.timeout = 1.0
     controller.server.unity_proc.kill()
     controller.server.unity_proc.wait()
     with pytest.raises((OSError, RuntimeError)):
