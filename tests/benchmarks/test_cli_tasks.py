@@ -477,7 +477,7 @@ BAD = {
     "show what is not there": (("show", "mini", "nope"), ["'nope'", "mini", "ids are such as"]),
     "show a suite that is not there": (("show", "maxi"), ["'maxi'", "mini"]),
     "show a type that is not there": (("show", "mini", "--types", "cook"), ["'cook'"]),
-    "verify what is no suite": (("verify", "nowhere.jsonl"), ["'nowhere.jsonl'", "task file"]),
+    "verify what is no suite": (("verify", "nowhere.jsonl"), ["nowhere.jsonl: no such file"]),
     "stats of a folder": (("stats", "."), [".json", ".jsonl"]),
     "convert to what is no format": (("convert", "mini", "x.csv"), ["x.csv", "FILE.json"]),
 }  # fmt: skip

@@ -101,7 +101,10 @@ NEVER: Mapping[str, tuple[str, ...]] = {
         "docs/zoo.md: er-gym train-rl",
         "er_gym/tasks/data/train.md: er-gym tasks generate",
     ),
-    "names something of the reader's own": ("docs/data.md: er-gym data show",),
+    "names something of the reader's own": (
+        "docs/data.md: er-gym data show",
+        "docs/ladder.md: er-gym new-model --from-gguf",
+    ),
     "changes the models that come with er-gym": ("docs/zoo.md: er-gym zoo add",),
     "shows files, or what is printed; nothing reads it": (
         "docs/agents.md: run.json",
