@@ -18,6 +18,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from hashlib import blake2b
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,10 @@ _RARE_END = 0.8
 """The share of the drawn ``end`` that are drawn again: most episodes would be short."""
 _BABBLE = 0.01
 """The share of the replies that name no action."""
-_SMALL = {"width": 64, "height": 48}
+# Flat light, the only one that older commits have.
+_SMALL = {"width": 64, "height": 48} | (
+    {"light": "flat"} if "light" in signature(EmbodiedEnv).parameters else {}
+)
 
 
 @dataclass(frozen=True)
