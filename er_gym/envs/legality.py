@@ -59,7 +59,7 @@ _BARE_WITH_HAND = [
     verb for verb in map(verbs.verb_named, verbs.BARE_VERBS) if verb.hand != verbs.ANY
 ]
 _BURNER = _of_type(["StoveBurner"])
-_TOGGLE_BURNER = INDEX[Action(verbs.TOGGLE, "StoveBurner")]
+TOGGLE_BURNER = INDEX[Action(verbs.TOGGLE, "StoveBurner")]
 _NO_GOAL = _of_type(verbs.NOWHERE)
 
 
@@ -311,7 +311,7 @@ def legal_actions(available: AvailableObjects, known: KnownTypes) -> NDArray[np.
     interactions = possible[available.interactable]
     legal[interactions[interactions >= 0]] = 1
     if len(available.covered):
-        legal[_TOGGLE_BURNER] = 1
+        legal[TOGGLE_BURNER] = 1
     if _IN_HAND and objects.held >= 0:
         with_held = possible[objects.held, _IN_HAND]
         legal[with_held[with_held >= 0]] = 1

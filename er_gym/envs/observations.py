@@ -83,10 +83,14 @@ SCALARS = (
 STATE_LAYOUT = (*SCALARS, *(f"{feature}:{name}" for feature in FEATURES for name in TYPES))
 """What each entry of the ``state`` vector means, in order: :data:`SCALARS`, then a row of types for
 each of :data:`FEATURES`."""
-_LAST = {verb: SCALARS.index(f"last {verb}") for verb in (*verbs.BARE_VERBS, *verbs.OBJECT_VERBS)}
-_GOAL_VERBS = slice(len(SCALARS) - len(GOAL_VERBS), len(SCALARS))
-_ROW = {feature: row for row, feature in enumerate(FEATURES)}
-_FIRST_DID = _ROW[_DID[0]]
+LAST_ENTRY = {
+    verb: SCALARS.index(f"last {verb}") for verb in (*verbs.BARE_VERBS, *verbs.OBJECT_VERBS)
+}
+ASKED_ENTRIES = slice(len(SCALARS) - len(GOAL_VERBS), len(SCALARS))
+FEATURE_ROW = {feature: row for row, feature in enumerate(FEATURES)}
+FIRST_DID = FEATURE_ROW[_DID[0]]
+"""Where the last action, the verbs asked for, the row of each feature and the rows of what was done
+stand in :data:`STATE_LAYOUT`."""
 _OFTEN = 4
 """``did`` counts no further than this."""
 _ROOM_SCALE = 10.0
@@ -290,25 +294,27 @@ def _state(situation: Situation) -> NDArray[np.float32]:
     scalars = pose_and_episode(situation)
     vector = np.zeros(len(STATE_LAYOUT), dtype=np.float32)
     vector[: len(scalars)] = [min(max(each, -1.0), 1.0) for each in scalars]
-    vector[_GOAL_VERBS] = goal(situation.instruction)[0]
-    if last is not None and last.verb in _LAST:  # the paper's protocol has other verbs and types
-        vector[_LAST[last.verb]] = 1.0
+    vector[ASKED_ENTRIES] = goal(situation.instruction)[0]
+    if (
+        last is not None and last.verb in LAST_ENTRY
+    ):  # the paper's protocol has other verbs and types
+        vector[LAST_ENTRY[last.verb]] = 1.0
     table = vector[len(SCALARS) :].reshape(len(FEATURES), len(TYPES))
-    table[_ROW["visible"]] = situation.perception.visible_types
-    table[_ROW["seen"]] = memory.seen
-    table[_ROW["navigable"]] = situation.known.types
-    table[_ROW["interactable"]] = situation.available.interactable_types
-    table[_ROW["open"]] = memory.is_open
-    table[_ROW["on"]] = memory.is_on
-    table[_ROW["goal"]] = memory.wanted
-    table[_ROW["found"]] = memory.found
-    table[_FIRST_DID:] = memory.did
+    table[FEATURE_ROW["visible"]] = situation.perception.visible_types
+    table[FEATURE_ROW["seen"]] = memory.seen
+    table[FEATURE_ROW["navigable"]] = situation.known.types
+    table[FEATURE_ROW["interactable"]] = situation.available.interactable_types
+    table[FEATURE_ROW["open"]] = memory.is_open
+    table[FEATURE_ROW["on"]] = memory.is_on
+    table[FEATURE_ROW["goal"]] = memory.wanted
+    table[FEATURE_ROW["found"]] = memory.found
+    table[FIRST_DID:] = memory.did
     if last is not None and last.object_type in KIND_OF:
-        table[_ROW["last"], KIND_OF[last.object_type]] = 1.0
+        table[FEATURE_ROW["last"], KIND_OF[last.object_type]] = 1.0
     if objects.held >= 0:
-        table[_ROW["held"], objects.kinds[objects.held]] = 1.0
+        table[FEATURE_ROW["held"], objects.kinds[objects.held]] = 1.0
     if situation.at is not None:
-        table[_ROW["at"], situation.at] = 1.0
+        table[FEATURE_ROW["at"], situation.at] = 1.0
     return vector
 
 

@@ -87,7 +87,7 @@ class Direct:
             positions: x, y and z of where it may stand.
         """
         world = self.world
-        places = on_floor(world, np.array(positions, dtype=np.float64)[:, [0, 2]])
+        places = on_floor(world, np.array(positions, dtype=np.float64).reshape(-1, 3)[:, ::2])
         found = interactable_poses(
             world, world.find(object_id), places, rotations, horizons, (True,)
         )

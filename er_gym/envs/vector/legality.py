@@ -13,8 +13,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs.actions import ACTIONS, INDEX, Action
+from er_gym.envs.actions import ACTIONS
 from er_gym.envs.legality import (
+    TOGGLE_BURNER,
     AvailableObjects,
     KnownTypes,
     affordances,
@@ -25,7 +26,6 @@ from er_gym.envs.perception import Perception
 from er_gym.tasks import verbs
 from er_gym.thor.objects import TYPES
 
-_TOGGLE_BURNER = INDEX[Action(verbs.TOGGLE, "StoveBurner")]
 _HAND_DECIDES = any(verb.in_hand for verb in map(verbs.verb_named, verbs.INTERACTIONS)) or any(
     verbs.verb_named(verb).hand != verbs.ANY for verb in verbs.BARE_VERBS
 )
@@ -123,5 +123,5 @@ def legal_together(
     legal.reshape(-1)[places[allowed]] = 1
     for k, one in enumerate(available):
         if len(one.covered):
-            legal[k, _TOGGLE_BURNER] = 1
+            legal[k, TOGGLE_BURNER] = 1
     return legal

@@ -12,8 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs.observations import (
+    ASKED_ENTRIES,
+    FEATURE_ROW,
     FEATURES,
+    FIRST_DID,
     GOAL_VERBS,
+    LAST_ENTRY,
     SCALARS,
     Memory,
     Situation,
@@ -24,10 +28,6 @@ from er_gym.envs.vector.legality import InRooms
 from er_gym.tasks import verbs
 from er_gym.thor.objects import KIND_OF, TYPES, ObjectTable
 
-_ROW = {feature: row for row, feature in enumerate(FEATURES)}
-_DID = _ROW[f"did {verbs.OBJECT_VERBS[0]}"]
-_LAST = {verb: SCALARS.index(f"last {verb}") for verb in (*verbs.BARE_VERBS, *verbs.OBJECT_VERBS)}
-_ASKED = slice(len(SCALARS) - len(GOAL_VERBS), len(SCALARS))
 _KEPT = ("seen", "is_open", "is_on", "found", "wanted", "did")
 """The arrays of a memory."""
 
@@ -107,24 +107,26 @@ def fill_states(
     """
     scalars = np.array([pose_and_episode(situation) for situation in situations], np.float32)
     np.clip(scalars, -1.0, 1.0, out=vectors[:, : scalars.shape[1]])
-    vectors[:, _ASKED] = memories.asked[agents]
+    vectors[:, ASKED_ENTRIES] = memories.asked[agents]
     table = vectors[:, len(SCALARS) :].reshape(len(agents), len(FEATURES), len(TYPES))
-    table[:, _ROW["visible"]] = [each.perception.visible_types for each in situations]
-    table[:, _ROW["seen"]] = memories.seen[agents]
-    table[:, _ROW["navigable"]] = [each.known.types for each in situations]
-    table[:, _ROW["interactable"]] = [each.available.interactable_types for each in situations]
-    table[:, _ROW["open"]] = memories.is_open[agents]
-    table[:, _ROW["on"]] = memories.is_on[agents]
-    table[:, _ROW["goal"]] = memories.wanted[agents]
-    table[:, _ROW["found"]] = memories.found[agents]
-    table[:, _DID:] = memories.did[agents]
+    table[:, FEATURE_ROW["visible"]] = [each.perception.visible_types for each in situations]
+    table[:, FEATURE_ROW["seen"]] = memories.seen[agents]
+    table[:, FEATURE_ROW["navigable"]] = [each.known.types for each in situations]
+    table[:, FEATURE_ROW["interactable"]] = [
+        each.available.interactable_types for each in situations
+    ]
+    table[:, FEATURE_ROW["open"]] = memories.is_open[agents]
+    table[:, FEATURE_ROW["on"]] = memories.is_on[agents]
+    table[:, FEATURE_ROW["goal"]] = memories.wanted[agents]
+    table[:, FEATURE_ROW["found"]] = memories.found[agents]
+    table[:, FIRST_DID:] = memories.did[agents]
     for k, situation in enumerate(situations):
         last, objects = situation.memory.last, situation.perception.objects
         if last is not None:
-            vectors[k, _LAST[last.verb]] = 1.0
+            vectors[k, LAST_ENTRY[last.verb]] = 1.0
             if last.object_type in KIND_OF:
-                table[k, _ROW["last"], KIND_OF[last.object_type]] = 1.0
+                table[k, FEATURE_ROW["last"], KIND_OF[last.object_type]] = 1.0
         if objects.held >= 0:
-            table[k, _ROW["held"], objects.kinds[objects.held]] = 1.0
+            table[k, FEATURE_ROW["held"], objects.kinds[objects.held]] = 1.0
         if situation.at is not None:
-            table[k, _ROW["at"], situation.at] = 1.0
+            table[k, FEATURE_ROW["at"], situation.at] = 1.0

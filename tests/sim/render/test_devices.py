@@ -15,9 +15,11 @@ from er_gym.thor import make_controller
 _DRAW = """
 import sys
 import numpy as np
+from er_gym.sim.render import panda
 from er_gym.sim.render.panda import RenderDeviceError, use_device
 from tests.sim.render.test_scene_graph import camera_of, stand, world_of
 use_device(sys.argv[1])
+panda._GPU_SHIFT *= float(sys.argv[3])
 from er_gym.sim.render.scene_graph import scene_graph_of
 found = {}
 try:
@@ -35,9 +37,9 @@ np.savez(sys.argv[2], **found)
 """
 
 
-def drawn_by(device: str, file: Path) -> dict[str, np.ndarray]:
+def drawn_by(device: str, file: Path, shift: float = 1.0) -> dict[str, np.ndarray]:
     result = subprocess.run(
-        [sys.executable, "-c", _DRAW, device, str(file)],
+        [sys.executable, "-c", _DRAW, device, str(file), str(shift)],
         capture_output=True, text=True, timeout=120,
         env={"PYTHONPATH": ":".join(path for path in sys.path if path)},
     )  # fmt: skip
@@ -58,6 +60,16 @@ def test_both_devices_draw_the_same(tmp_path: Path) -> None:
             assert (np.abs(one - other) < 0.02 + 0.02 * other).mean() > 0.95, name
         else:
             assert np.abs(one.astype(int) - other).mean() < 8, name
+
+
+def test_the_shift_makes_more_pixels_agree(tmp_path: Path) -> None:
+    ours = drawn_by("cpu", tmp_path / "cpu.npz")
+    same = []
+    for shift in (-1.0, 0.0, 1.0):
+        theirs = drawn_by("gpu", tmp_path / f"{shift}.npz", shift)
+        ids = [name for name in ours if name.startswith("ids")]
+        same.append(np.mean([(ours[name] == theirs[name]).mean() for name in ids]))
+    assert same == sorted(same)
 
 
 def test_there_is_one_device_a_process() -> None:
