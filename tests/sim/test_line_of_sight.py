@@ -8,7 +8,9 @@ import pytest
 from er_gym.sim.controller import EmbeddedController
 from er_gym.sim.scene import load_scene
 from er_gym.sim.settings import Settings
+from er_gym.sim.space import line_of_sight
 from er_gym.sim.space.changes import Changes
+from er_gym.sim.space.compiled_sight import kernel
 from er_gym.sim.space.frustum import in_frustum
 from er_gym.sim.space.line_of_sight_builder import compute_lines_of_sight, lines_of_sight
 from er_gym.sim.space.rays import blocked_by
@@ -48,12 +50,23 @@ def rearrange(controller, seed):
         assert controller.step(action="SetObjectPoses", objectPoses=poses)
 
 
+@pytest.fixture(params=["numpy", "compiled"])
+def way(request, monkeypatch) -> str:
+    """Lines of sight are computed with and without the compiled kernel."""
+    if request.param == "numpy":
+        monkeypatch.setattr(line_of_sight, "kernel", lambda: None)
+    elif kernel() is None:
+        pytest.skip("this machine has no C compiler")
+    return request.param
+
+
 @pytest.mark.parametrize("rearranged", [False, True])
 @pytest.mark.parametrize("scene", ["FloorPlan1", "FloorPlan16", "FloorPlan203", "FloorPlan403"])
 def test_the_difference_from_the_record_gives_what_all_boxes_give(
-    scene: str, rearranged: bool
+    scene: str, rearranged: bool, monkeypatch
 ) -> None:
     random = np.random.default_rng(len(scene))
+    monkeypatch.setattr(line_of_sight, "kernel", lambda: None)
     with EmbeddedController(scene=scene, headless=True, visibilityDistance=20) as controller:
         if rearranged:
             rearrange(controller, seed=1)
@@ -117,7 +130,7 @@ def test_what_looks_as_recorded_again_is_known_as_such() -> None:
         assert lines_of_sight(world) is opened
 
 
-def test_what_is_cut_up_behind_a_closed_door_is_hidden_and_then_seen() -> None:
+def test_what_is_cut_up_behind_a_closed_door_is_hidden_and_then_seen(way: str) -> None:
     with EmbeddedController(scene="FloorPlan1", headless=True, visibilityDistance=20) as controller:
         world = controller.server.engine.world
         tomato, fridge = (world.object_ids[next(world.of_type(t))] for t in ("Tomato", "Fridge"))
@@ -160,6 +173,7 @@ def test_changes_that_are_known_from_a_place_give_what_all_boxes_give(monkeypatc
         return found
 
     monkeypatch.setattr(Changes, "hidden_from", noted)
+    monkeypatch.setattr(line_of_sight, "kernel", lambda: None)
     with EmbeddedController(scene="FloorPlan1", headless=True, visibilityDistance=20) as controller:
         world = controller.server.engine.world
 
@@ -206,3 +220,42 @@ def test_a_picture_needs_only_the_rays_to_what_is_in_it(scene: str) -> None:
             assert len(known.viewpoint(camera, lens).blocked_point) < len(
                 known.viewpoint(camera).blocked_point
             )
+
+
+@pytest.mark.skipif(kernel() is None, reason="this machine has no C compiler")
+@pytest.mark.parametrize("scene", ["FloorPlan7", "FloorPlan201", "FloorPlan311", "FloorPlan415"])
+def test_the_compiled_kernel_answers_as_numpy_does(scene: str, monkeypatch) -> None:
+    random = np.random.default_rng(len(scene))
+    with EmbeddedController(scene=scene, headless=True, visibilityDistance=20) as controller:
+        world = controller.server.engine.world
+        floor = world.scene.reachable
+        looks = seen = open_lines = lines = 0
+        for _ in range(12):
+            random_changes(controller, random, 6)
+            known = lines_of_sight(world)
+            cameras = np.insert(random.permutation(floor)[:5], 1, world.agent.camera[1], axis=1)
+            before = random.choice(known.points, 5) - [0.05, 0.0, 0.0]  # nearer than the near plane
+            cameras = np.concatenate([cameras, before])
+            objects = random.choice(len(world), 4, replace=False).tolist()
+            for camera in cameras:
+                # No tilt, so that points lie on the picture's edge: a room is full of right angles.
+                for rotation, horizon, aspect in (
+                    (90.0, 0.0, 1.0),
+                    (45.0, 30.0, 1.0),
+                    (200.0, -30.0, 16 / 9),
+                ):
+                    lens = (rotation, horizon, 90.0, aspect)
+                    compiled = known.look(camera, lens)
+                    with monkeypatch.context() as patch:
+                        patch.setattr(line_of_sight, "kernel", lambda: None)
+                        assert (known.look(camera, lens) == compiled).all()
+                    looks, seen = looks + len(compiled), seen + int(compiled.sum())
+            for i in objects:
+                span = slice(known.first_point[i], known.first_point[i] + known.point_count[i])
+                compiled = known.unobstructed(cameras, known.points[span], i)
+                with monkeypatch.context() as patch:
+                    patch.setattr(line_of_sight, "kernel", lambda: None)
+                    assert (known.unobstructed(cameras, known.points[span], i) == compiled).all()
+                lines, open_lines = lines + compiled.size, open_lines + int(compiled.sum())
+        assert 0.05 < seen / looks < 0.5
+        assert 0.05 < open_lines / lines < 0.95

@@ -8,15 +8,14 @@ return 0, loads it and deletes it again. The loader then considers the name as l
 
 from __future__ import annotations
 
-import ctypes
-import os
 import struct
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
+
+from er_gym.sim.shared_library import load, load_bytes
 
 _SONAME = "libX11.so.6"
 _RASTERISER = "libp3tinydisplay.so"
@@ -42,7 +41,7 @@ def provide_libx11() -> None:
     Raises:
         ImportError: there is no libX11, and the system does not load a stand-in.
     """
-    if sys.platform != "linux" or _loads(_SONAME):
+    if sys.platform != "linux" or load(_SONAME) is not None:
         return
     rasteriser = _rasteriser()
     if rasteriser is None:
@@ -51,7 +50,7 @@ def provide_libx11() -> None:
     if machine not in _RETURN_0:
         raise ImportError(_ADVICE)
     stub = stand_in(_SONAME, names, machine)
-    if not (_loads_from_file(stub) or _loads_from_memory(stub)):
+    if load_bytes(stub, _SONAME) is None:
         raise ImportError(_ADVICE)
 
 
@@ -60,39 +59,6 @@ def _rasteriser() -> Path | None:
     package = find_spec("panda3d")
     places = (package.submodule_search_locations if package else None) or ()
     return next((p for p in (Path(place, _RASTERISER) for place in places) if p.exists()), None)
-
-
-# -- loading -------------------------------------------------------------------------------------
-
-
-def _loads(path: str) -> bool:
-    try:
-        # Local, because another library may bring its own X11.
-        ctypes.CDLL(path, mode=ctypes.RTLD_LOCAL)
-    except OSError:
-        return False
-    return True
-
-
-def _loads_from_file(content: bytes) -> bool:
-    try:
-        with tempfile.TemporaryDirectory(prefix="er-gym-") as folder:
-            path = Path(folder, _SONAME)
-            path.write_bytes(content)
-            return _loads(str(path))
-    except OSError:
-        return False
-
-
-def _loads_from_memory(content: bytes) -> bool:
-    """Load from memory, for machines that let no file be written or executed."""
-    try:
-        handle = os.memfd_create(_SONAME)
-    except (AttributeError, OSError):
-        return False
-    with open(handle, "wb", buffering=0) as file:
-        file.write(content)
-        return _loads(f"/proc/self/fd/{handle}")
 
 
 # -- reading -------------------------------------------------------------------------------------

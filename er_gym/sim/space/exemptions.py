@@ -55,6 +55,18 @@ class Exemptions:
         """Those of the world as it is now."""
         return Exemptions(world.nesting.within, _kinds(tuple(world.types)))
 
+    @property
+    def arrays(self) -> dict[str, Mask]:
+        """What :meth:`of_objects` reads, by the names of the compiled kernel."""
+        kinds = self._kinds
+        return {
+            "within": self.within,
+            "from_outside": kinds.from_outside,
+            "slab": kinds.slab,
+            "carcass": kinds.carcass,
+            "in_counter": self._in_counter,
+        }
+
     @cached_property
     def _in_counter(self) -> Mask:
         return np.asarray(self.within[:, self._kinds.fronts].any(axis=1))

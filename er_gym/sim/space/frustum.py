@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 NEAR_PLANE = 0.1
 """Distance of the camera's near plane, metres."""
 
+Lens = tuple[float, float, float, float]
+"""Rotation, horizon and vertical field of view of a camera, degrees; width divided by height."""
+
 
 def in_frustum(
     offsets: NDArray[np.float64],

@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 from er_gym.sim.remembering import get_or_compute
 from er_gym.sim.space.changes import MOST_CHANGES, Boxes, Changes, Known
+from er_gym.sim.space.compiled_sight import CompiledSight, kernel
 from er_gym.sim.space.exemptions import Exemptions
-from er_gym.sim.space.frustum import in_frustum
+from er_gym.sim.space.frustum import Lens, in_frustum
 from er_gym.sim.space.outlines import Outlines
 from er_gym.sim.space.rays import Targets, blocked_by, crossings
 
@@ -36,8 +37,6 @@ _VIEWS_KEPT = 512
 T = TypeVar("T")
 Floats = NDArray[np.float32]
 
-Lens = tuple[float, float, float, float]
-"""Rotation, horizon and vertical field of view of a camera, degrees; width divided by height."""
 Rectangle = tuple[tuple[float, float], tuple[float, float]]
 """Lower and upper corner, x and z, metres."""
 
@@ -117,6 +116,32 @@ class LinesOfSight:
             (*camera.tolist(), lens),
             _VIEWPOINTS_KEPT,
             lambda: self._look_from(camera, lens),
+        )
+
+    def look(self, camera: NDArray[np.float64], lens: Lens) -> NDArray[np.bool_]:
+        """(N,) the objects with a sample point that is in the picture and that nothing hides.
+
+        Args:
+            camera: (3,) its position, metres.
+        """
+        if kernel() is not None:
+            return self._compiled.look(camera, lens)
+        seen = np.zeros(len(self.point_count), dtype=bool)
+        seen[self.point_owner[self.clear_in_view(camera, lens)]] = True
+        return seen
+
+    @cached_property
+    def _compiled(self) -> CompiledSight:
+        return CompiledSight(
+            points=self.points,
+            first_point=self.first_point,
+            point_count=self.point_count,
+            box_low=self.box_low,
+            box_high=self.box_high,
+            box_owner=self.box_owner,
+            removed=self.removed_boxes,
+            concealed=self.concealed,
+            **self.exempt.arrays,
         )
 
     def clear_in_view(self, camera: NDArray[np.float64], lens: Lens) -> NDArray[np.uint16]:
@@ -280,6 +305,8 @@ class LinesOfSight:
             eyes: (E, 3) camera positions, metres.
             points: (Q, 3) metres.
         """
+        if kernel() is not None:
+            return self._compiled.unobstructed(eyes, points, i)
         origins = eyes.astype(np.float32)
         # A box that does not reach into the space between eyes and points hides nothing.
         nearest = np.minimum(origins.min(axis=0), points.min(axis=0))

@@ -44,7 +44,6 @@ def _look(known: LinesOfSight, agent: Agent, settings: Settings) -> NDArray[np.b
         settings.field_of_view,
         settings.width / settings.height,
     )
-    found = np.zeros(len(known.point_count), dtype=bool)
-    found[known.point_owner[known.clear_in_view(agent.camera, lens)]] = True
+    found = known.look(agent.camera, lens)
     near = known.within_distance(agent.position, settings.visibility_distance)
     return found if near is None else found & near

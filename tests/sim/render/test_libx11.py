@@ -15,6 +15,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="other systems n
 NAMES = ("XOpenDisplay", "XFree", "_XPrivate")
 DRAW = """
 import sys
+from er_gym.sim import shared_library
 from er_gym.sim.render import libx11
 libx11._SONAME = "libZ11.so.6"
 BEFORE
@@ -81,7 +82,7 @@ def test_nothing_is_both_written_to_and_executed(machine: int) -> None:
 
 
 def test_where_libx11_is_installed_nothing_is_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(libx11, "_loads", lambda path: path == "libX11.so.6")
+    monkeypatch.setattr(libx11, "load", lambda name: name if name == "libX11.so.6" else None)
     monkeypatch.setattr(libx11, "wanted_symbols", lambda path: pytest.fail("looked for a stand-in"))
     libx11.provide_libx11()
 
@@ -90,7 +91,8 @@ def test_a_system_that_loads_no_stand_in_is_told_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     rasteriser()
-    monkeypatch.setattr(libx11, "_loads", lambda path: False)
+    monkeypatch.setattr(libx11, "load", lambda name: None)
+    monkeypatch.setattr(libx11, "load_bytes", lambda content, name: None)
     with pytest.raises(ImportError, match="apt-get install libx11-6"):
         libx11.provide_libx11()
 
@@ -124,9 +126,9 @@ def draw(folder: Path, before: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize("way", ["_loads_from_memory", "_loads_from_file"])
+@pytest.mark.parametrize("way", ["load_from_memory", "load_from_file"])
 def test_a_picture_is_drawn_without_libx11(without_x: Path, way: str) -> None:
-    done = draw(without_x, f"libx11.{way} = lambda content: False")
+    done = draw(without_x, f"shared_library.{way} = lambda content, name: None")
     assert done.stdout == "drawn\n", done.stderr
 
 
