@@ -214,12 +214,15 @@ class Situation:
 
 
 @cache
-def _named() -> Sequence[tuple[str, re.Pattern[str]]]:
-    """The object types, the longest names first, each with how an instruction names it."""
+def _named() -> Sequence[tuple[str, str, re.Pattern[str]]]:
+    """The object types, the longest names first, each with its first word in small letters, and
+    with how an instruction names it."""
     found = []
     for name in sorted(TYPES, key=len, reverse=True):
-        words = r"[\s-]?".join(re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z]+|\d+", name))
-        found.append((name, re.compile(rf"\b{words}(?:s|es)?\b", re.IGNORECASE)))
+        words = re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z]+|\d+", name)
+        apart = r"[\s-]?".join(words)
+        pattern = re.compile(rf"\b{apart}(?:s|es)?\b", re.IGNORECASE)
+        found.append((name, words[0].lower(), pattern))
     return found
 
 
@@ -239,7 +242,10 @@ def goal(instruction: str) -> tuple[tuple[float, ...], tuple[tuple[str, float], 
     """
     mentions = []
     taken = np.zeros(len(instruction) + 1, dtype=bool)
-    for name, pattern in _named():
+    small = instruction.casefold()
+    for name, first_word, pattern in _named():
+        if first_word not in small:  # quicker than the pattern, which most names do not match
+            continue
         for match in pattern.finditer(instruction):
             span = slice(*match.span())
             if not taken[span].any():

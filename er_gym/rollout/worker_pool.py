@@ -145,6 +145,8 @@ def run_jobs(
                     continue
                 if isinstance(result, _SetupFailed):
                     raise WorkerSetupError(result.message)
+                if waiting:  # at once: the caller may take long over the result
+                    team[place].give(waiting.popleft())
                 yield attempt.job, result
     finally:
         for worker in team:

@@ -282,16 +282,15 @@ def _type_mismatches(task: Task) -> list[str]:
 
 def _find_respelled(task: Task, objects: Collection[str]) -> tuple[dict[str, str], list[str]]:
     """The ids that the scene spells differently, with its spelling, and the ids that it lacks."""
-    spelled = {_coordinates(object_id): object_id for object_id in objects}
-    respelled, missing = {}, []
-    for object_id in dict.fromkeys(map(_whole_of_slice, _all_ids(task))):
-        if object_id not in objects:
-            other = spelled.get(_coordinates(object_id))
-            if other is None:
-                missing.append(object_id)
-            else:
-                respelled[object_id] = other
-    return respelled, missing
+    unknown = [
+        object_id
+        for object_id in dict.fromkeys(map(_whole_of_slice, _all_ids(task)))
+        if object_id not in objects
+    ]
+    spelled = {_coordinates(object_id): object_id for object_id in objects} if unknown else {}
+    others = {object_id: spelled.get(_coordinates(object_id)) for object_id in unknown}
+    respelled = {object_id: other for object_id, other in others.items() if other is not None}
+    return respelled, [object_id for object_id, other in others.items() if other is None]
 
 
 def _coordinates(object_id: str) -> tuple[str, ...]:

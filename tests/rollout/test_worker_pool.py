@@ -124,6 +124,13 @@ def test_leaving_early_ends_workers_at_once(jobs, tmp_path):
     assert time.monotonic() - started < 30
 
 
+def test_a_worker_goes_on_while_its_result_is_looked_at(jobs, tmp_path):
+    results = run_jobs(partial(jobs.Mixed, tmp_path), ["quick", "slow"], workers=1)
+    assert next(results) == ("quick", "quick")
+    wait_for(lambda: list(tmp_path.glob("began-*")))
+    results.close()
+
+
 PARENT = """
 from functools import partial
 from pathlib import Path
