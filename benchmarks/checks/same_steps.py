@@ -122,7 +122,7 @@ def play(env: EmbodiedEnv, case: Case, seed: int) -> Played:
     digest.add((obs, info))
     solver, steps, over = Solver(), 0, False
     while not over:
-        action = _choose(env, case, solver, random, info)
+        action = choose(env, case, solver, random, info)
         obs, reward, ended, cut, info = env.step(action)
         digest.add((str(action), obs, reward, ended, cut, info, env.details, vars(env.agent_pose)))
         steps, over = steps + 1, ended or cut
@@ -131,7 +131,7 @@ def play(env: EmbodiedEnv, case: Case, seed: int) -> Played:
     return Played(steps, digest.text())
 
 
-def _choose(
+def choose(
     env: EmbodiedEnv, case: Case, solver: Solver, random: np.random.Generator, info: dict[str, Any]
 ) -> Any:
     draw = random.random()

@@ -7,7 +7,7 @@ the agent went.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -37,6 +37,7 @@ class EpisodeSetup:
         start: the pose in which the agent will be placed.
         grid_size: metres.
         instances: which object a type name stands for, see :mod:`er_gym.envs.object_selection`.
+        resumed: whether the episode began earlier; :meth:`ActionHandler.restore` follows.
     """
 
     task: Task
@@ -45,6 +46,7 @@ class EpisodeSetup:
     start: AgentPose
     grid_size: float
     instances: str
+    resumed: bool = False
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,12 @@ class ActionHandler(Protocol):
 
     def execute(self, action: Action, now: StepContext) -> ExecutedAction:
         """Carry out a legal action."""
+
+    def state(self) -> dict[str, Any]:
+        """What it remembers of the episode, as plain data."""
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Remember what :meth:`state` told."""
 
 
 class DefaultActionHandler:
@@ -128,6 +136,15 @@ class DefaultActionHandler:
             chosen = object_selection.select_nearest(able, objects, now.perception.pose)
         done = skills.interact(setup.controller, action.verb, objects, chosen)
         return objects.ids[chosen], done
+
+    def state(self) -> dict[str, Any]:
+        """Where the agent went."""
+        return {"navigated_to": self.navigated_to, "visited": self._visited}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See :meth:`state`."""
+        self.navigated_to = state["navigated_to"]
+        self._visited = {name: list(ids) for name, ids in state["visited"].items()}
 
     def _navigate(self, object_type: str, now: StepContext) -> ExecutedAction:
         setup, perception = self._setup, now.perception

@@ -26,6 +26,7 @@ from er_gym.envs.outer_limit import outer_step_limit
 from er_gym.envs.perception import SENSORS
 from er_gym.envs.protocol import DEFAULT, protocol_named
 from er_gym.envs.reset_options import checked_options
+from er_gym.envs.saved_episode import BROKEN_OFF, SavedEpisode
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.envs.window import Window
 from er_gym.tasks.task import AgentPose, Task
@@ -33,15 +34,14 @@ from er_gym.tasks.types import types_named
 from er_gym.thor import BACKENDS, LIGHTS, RENDER_DEVICES, check_size, make_controller
 
 _NOT_BEGUN, _CLOSED = "no episode has begun", "the environment is closed"
-_BROKEN_OFF = "the last reset or step was broken off by an error"
-"""The reasons why no episode is under way."""
+"""Reasons why no episode is under way."""
 _LARGEST_SIDE = 4096
 """The longest side of a picture, pixels."""
 _SMALLEST_GRID, _LARGEST_GRID = 0.01, 5.0
 """Metres. AI2-THOR allows less, but working out where the agent can stand then takes minutes."""
 
 
-class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
+class EmbodiedEnv(SavedEpisode, gymnasium.Env[dict[str, Any], Any]):
     """A household task in an AI2-THOR room, played with high-level actions.
 
     ## Description
@@ -118,10 +118,11 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
     names the reason, and ``info["max_steps"]`` the step limit.
 
     ## Copies and Threads
-    ``copy.deepcopy`` and ``pickle`` keep the episode: a new copy replays the task's actions and
-    continues with equal observations. ``backend="unity"`` does not repeat itself exactly, so there
-    only an environment without an episode can be copied. Threads that share an environment wait for
-    each other.
+    ``copy.deepcopy`` and ``pickle`` keep the episode: a copy goes on with equal observations.
+    :meth:`snapshot` gives the episode alone as bytes, :meth:`restore` goes back to it, and
+    :meth:`fork` makes environments in which it goes on independently. ``backend="unity"`` does not
+    tell its state, so there only an environment without an episode can be copied. Threads that
+    share an environment wait for each other.
 
     ## Arguments
     - ``episode_source``: where tasks are drawn from: a list of tasks; the name of a suite (default
@@ -250,7 +251,6 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         self._lock = threading.RLock()
         self._no_episode = _NOT_BEGUN  # why no episode is under way; "" if one is
         self._outer_limit: int | None = None  # of this episode, see outer_limit.py
-        self._actions_taken: list[AnyAction] = []  # in this episode, for copies to replay
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = spaces.Dict(
             {name: kind.space(width, height) for name, kind in self._obs.items()}
@@ -374,52 +374,6 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
             live, self._generator = self._generator, None
             getattr(live, "close", lambda: None)()
 
-    def __getstate__(self) -> dict[str, Any]:
-        """The state of a copy: the arguments, the task, and the actions taken so far.
-
-        Raises:
-            gymnasium.error.Error: an episode is under way on ``backend="unity"``.
-        """
-        with self._lock:
-            if not self._no_episode and self._backend != "embedded":
-                raise gymnasium.error.Error(
-                    f"an episode on backend {self._backend!r} cannot be copied, since it does not "
-                    "repeat itself exactly: copy the environment before reset(), or reset another "
-                    "with options={'task': env.unwrapped.task} and do the same actions there"
-                )
-            episode = None if self._no_episode else self._current("copying")
-            return {
-                **EzPickle.__getstate__(self),
-                "random": (self._np_random, self._np_random_seed, self.action_space),
-                "no_episode": self._no_episode,
-                "episode": episode and (episode.task, self._actions_taken, episode.fingerprint),
-                "faults": (self._faults, episode and episode.faults),
-                "outer_limit": self._outer_limit,
-            }
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Make the environment anew, and replay the actions taken.
-
-        Raises:
-            gymnasium.error.Error: the replay led elsewhere, as in another version of er-gym.
-        """
-        EzPickle.__setstate__(self, state)
-        self._faults, faults = state.get("faults", (self._faults, None))
-        if state["episode"] is not None:
-            task, actions, fingerprint = state["episode"]
-            self._begin(task, faults, state.get("outer_limit"))
-            episode = self._current("copying")
-            for action in actions:
-                self._do(episode, action)
-            if episode.fingerprint != fingerprint:
-                self.close()
-                raise gymnasium.error.Error(
-                    f"the episode of task {task.id} did not come out the same when it was played "
-                    "again; reset a new environment instead"
-                )
-        self._no_episode = state["no_episode"]
-        self._np_random, self._np_random_seed, self.action_space = state["random"]
-
     # -- the loop's parts ------------------------------------------------------------------------
 
     def _current(self, before: str) -> Episode:
@@ -436,21 +390,22 @@ class EmbodiedEnv(gymnasium.Env[dict[str, Any], Any], EzPickle):
         return replace(self._faults, seed=(own, *self._faults.seed))
 
     def _begin(self, task: Task, faults: FaultPlan | None, replies: int | None) -> ResetResult:
-        self._no_episode = _BROKEN_OFF  # until this has succeeded
-        self._actions_taken = []
+        self._no_episode = BROKEN_OFF  # until this has succeeded
         controller = self._started_controller(task.scene)
-        self._episode = self._episode_type(
-            self._settings, task, controller, self._backend, faults, replies
-        )
-        self._outer_limit = replies
+        self._episode = self._new_episode(task, controller, faults, replies)
         answer = self._episode.begin()
         self._no_episode = ""
         return answer
 
+    def _new_episode(
+        self, task: Task, controller: Any, faults: FaultPlan | None, replies: int | None
+    ) -> Episode:
+        self._outer_limit = replies
+        return self._episode_type(self._settings, task, controller, self._backend, faults, replies)
+
     def _do(self, episode: Episode, action: AnyAction) -> StepResult:
         understood, text = episode.parse_action(action)
-        self._no_episode = _BROKEN_OFF  # until this has succeeded
-        self._actions_taken.append(int(action.item()) if isinstance(action, np.ndarray) else action)
+        self._no_episode = BROKEN_OFF  # until this has succeeded
         answer = episode.step(understood, text)
         self._no_episode = ""
         return answer

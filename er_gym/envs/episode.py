@@ -8,8 +8,8 @@ and rewards.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, TypeAlias, cast
+from dataclasses import astuple, dataclass, replace
+from typing import Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from er_gym.tasks import verbs
 from er_gym.tasks.arrangement import set_up_scene
 from er_gym.tasks.goal import Condition, unmet_conditions
 from er_gym.tasks.judge import Criteria, Progress
-from er_gym.tasks.task import Task
+from er_gym.tasks.task import AgentPose, Task
 from er_gym.thor.objects import ENTRY_KEYS
 
 MAX_UNKNOWN = 3
@@ -66,6 +66,18 @@ class EpisodeSettings:
     step_penalty: float
     illegal_penalty: float
     annotate: bool
+
+
+class _Telling(NamedTuple):
+    """What an action led to, as the last observation and ``info`` tell it."""
+
+    action: Action | None
+    text: str
+    success: bool
+    object_id: str
+    feedback: str
+    views: Mapping[str, Perception]
+    appended: bool
 
 
 class Episode:
@@ -115,25 +127,85 @@ class Episode:
 
     def begin(self) -> ResetResult:
         """Arrange the scene and place the agent."""
-        task, settings, controller = self.task, self._settings, self._controller
+        task, controller = self.task, self._controller
         bounds = set_up_scene(controller, task.scene, task.arrangement).metadata["sceneBounds"]
-        floor = skills.reachable(controller, (self._backend, task.scene, settings.grid_size))
+        floor = self._floor()
         pose = self._protocol.start(bounds, floor)
         self._memory = Memory(pose, goal_row(task.instruction))
-        self._handler: ActionHandler = self._protocol.action_handler(
-            EpisodeSetup(task, controller, floor, pose, settings.grid_size, settings.instances)
-        )
-        if self.faults is not None:
-            self._handler = self._faulty = self.faults.handler(self._handler, self._known)
+        self._make_handler(pose)
         placed = skills.place(controller, pose)
         self._perceive(placed)
         feedback = "You look around the room."
         return self._told(None, "", placed.success, "", feedback, {})
 
-    @property
-    def fingerprint(self) -> tuple[Any, ...]:
-        """A value that shows whether a replay has diverged: pose, steps, end and known types."""
-        return self.perception.pose, self._steps, self.end_reason, self._known.names
+    def _floor(self) -> skills.Reachable:
+        key = (self._backend, self.task.scene, self._settings.grid_size)
+        return skills.reachable(self._controller, key)
+
+    def _make_handler(self, start: AgentPose, *, resumed: bool = False) -> None:
+        settings = self._settings
+        setup = EpisodeSetup(
+            self.task,
+            self._controller,
+            self._floor(),
+            start,
+            settings.grid_size,
+            settings.instances,
+            resumed,
+        )
+        self._handler: ActionHandler = self._protocol.action_handler(setup)
+        if self.faults is not None:
+            self._handler = self._faulty = self.faults.handler(self._handler, self._known)
+
+    def state(self) -> dict[str, Any]:
+        """The episode now as plain data: all but the task, and with the embedded engine's world."""
+        told = self._telling
+        return {
+            "world": self._controller.world_state(),
+            "memory": self._memory.state(),
+            "known": self._known.types.nonzero()[0].tolist(),
+            "handler": self._handler.state(),
+            "faults": self.faults and self.faults.state(),
+            "done": self._progress.numbers_done,
+            "ended": [self._progress.ended, self._progress.success],
+            "unmet": [self.task.goal.index(each) for each in self._goal_unmet],
+            "counts": [self._steps, self._replies_left, self._unknown_replies],
+            "end_reason": self.end_reason,
+            "fault": self._fault,
+            "action": told.action and [told.action.verb, told.action.object_type],
+            "told": [told.text, told.success, told.object_id, told.feedback, told.appended],
+            "views": {name: list(astuple(view.pose)) for name, view in told.views.items()},
+        }
+
+    def resume(self, state: Mapping[str, Any]) -> ResetResult:
+        """Take up an episode of the task where :meth:`state` left it, in place of :meth:`begin`.
+
+        The controller's scene is arranged for the task; what has been done in it does not matter.
+
+        Returns:
+            The observation and ``info`` of the step that was the last.
+        """
+        controller, world = self._controller, state["world"]
+        self._memory = Memory.of_state(state["memory"], self.task.instruction)
+        self._make_handler(self._memory.start, resumed=True)
+        self._known.add(np.array(state["known"], np.intp))
+        self._handler.restore(state["handler"])
+        self._progress = Progress.at(self._progress.criteria, state["done"], *state["ended"])
+        self._goal_unmet = tuple(self.task.goal[k] for k in state["unmet"])
+        self._steps, self._replies_left, self._unknown_replies = state["counts"]
+        self.end_reason, self._fault = state["end_reason"], state["fault"]
+        controller.restore_world(world)
+        views = {
+            name: skills.look_from(controller, AgentPose(*pose))
+            for name, pose in state["views"].items()
+        }
+        if views:
+            controller.restore_world(world)
+        self.perception = skills.look(controller)
+        self._available = self._handler.available_objects(self.perception)
+        action = None if state["action"] is None else Action(*state["action"])
+        text, success, object_id, feedback, appended = state["told"]
+        return self._told(action, text, success, object_id, feedback, views, appended)
 
     @property
     def max_steps(self) -> int:
@@ -292,6 +364,7 @@ class Episode:
         appended: bool = False,
     ) -> ResetResult:
         """The observation and ``info`` after ``reset`` or a step."""
+        self._telling = _Telling(action, text, success, object_id, feedback, views, appended)
         perception, available, progress = self.perception, self._available, self._progress
         situation = self._situation = Situation(
             perception=perception,

@@ -29,6 +29,7 @@ from er_gym.envs.arguments import number, short_repr
 from er_gym.envs.legality import AvailableObjects, KnownTypes
 from er_gym.envs.perception import Perception
 from er_gym.envs.skills import Outcome
+from er_gym.envs.snapshot import generator_of, generator_state
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import is_among
 from er_gym.tasks.task import type_of_id
@@ -143,6 +144,16 @@ class FaultPlan:
     rates: FaultRates
     seed: tuple[int, ...]
 
+    def state(self) -> list[Any]:
+        """Its rates and its seed, as plain data."""
+        return [dict(self.rates), [str(number) for number in self.seed]]
+
+    @staticmethod
+    def of_state(state: Sequence[Any]) -> FaultPlan:
+        """The plan whose :meth:`state` this is."""
+        rates, seed = state
+        return FaultPlan(fault_rates(rates), tuple(map(int, seed)))
+
     def handler(self, inner: ActionHandler, known: KnownTypes) -> FaultyActionHandler:
         """An action handler with these faults."""
         return FaultyActionHandler(
@@ -207,6 +218,19 @@ class FaultyActionHandler:
         if kind == NAVIGATE:
             return self._arrive_elsewhere(action, now)
         return "", Outcome(None, False, _ARM_FAILED[kind])
+
+    def state(self) -> dict[str, Any]:
+        """The protocol's, and which faults are still to come."""
+        tries = [[each.verb, each.object_type, n] for each, n in self._in_a_row.items()]
+        random = generator_state(self._random)
+        return {"inner": self._inner.state(), "fault": self.fault, "tries": tries, "random": random}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See :meth:`state`."""
+        self._inner.restore(state["inner"])
+        self.fault = state["fault"]
+        self._in_a_row = Counter({Action(verb, kind): n for verb, kind, n in state["tries"]})
+        self._random = generator_of(state["random"])
 
     def _arrive_elsewhere(self, action: Action, now: StepContext) -> ExecutedAction:
         objects = now.perception.objects

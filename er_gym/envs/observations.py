@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import string
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from functools import cache, cached_property, lru_cache
 from math import cos, radians, sin
 from typing import Any
@@ -102,6 +102,10 @@ MAX_REPEATS = 3
 """The number of times in a row that the same action is executed; one more ends the episode."""
 
 
+_REMEMBERED = ("seen", "is_open", "is_on", "found", "did")
+"""The arrays of a memory that change as the episode goes on."""
+
+
 def _nothing() -> NDArray[np.float32]:
     return np.zeros(len(TYPES), dtype=np.float32)
 
@@ -161,6 +165,26 @@ class Memory:
     def forget_last(self) -> None:
         """Forget the last action: the next action then does not count as a repetition."""
         self.last, self.repeats = None, 0
+
+    def state(self) -> dict[str, Any]:
+        """All but the instruction's part, as plain data."""
+        return {
+            "start": list(astuple(self.start)),
+            "arrays": [getattr(self, name).tobytes() for name in _REMEMBERED],
+            "last": self.last and [self.last.verb, self.last.object_type],
+            "repeats": self.repeats,
+        }
+
+    @staticmethod
+    def of_state(state: Mapping[str, Any], instruction: str) -> Memory:
+        """The memory whose :meth:`state` this is."""
+        memory = Memory(AgentPose(*state["start"]), goal_row(instruction))
+        for name, content in zip(_REMEMBERED, state["arrays"], strict=True):
+            array = getattr(memory, name)
+            array[:] = np.frombuffer(content, array.dtype).reshape(array.shape)
+        memory.last = None if state["last"] is None else Action(*state["last"])
+        memory.repeats = state["repeats"]
+        return memory
 
     def act(self, action: Action, success: bool) -> None:
         """Remember an action that the agent did or tried."""

@@ -6,6 +6,10 @@ odd rules are reproduced, too, so that results are comparable with the paper's t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -92,6 +96,8 @@ class PaperActionHandler:
         for object_id in task.target_objects:
             self._targets.setdefault(object_id.split("|")[0], []).append(object_id)
         self._first: dict[str, ObjectSnapshot] = {}
+        if setup.resumed:
+            return
         for entry in setup.controller.last_event.metadata["objects"]:
             if entry["objectType"] not in self._first:
                 self._first[entry["objectType"]] = snapshot_of(entry)
@@ -156,6 +162,21 @@ class PaperActionHandler:
                 self._inside = type_mask(np.array([KIND_OF[t] for t in types if t in KIND_OF], int))
         return target.object_id, outcome
 
+    def state(self) -> dict[str, Any]:
+        """Where the agent went, and the objects as they were when the episode began."""
+        return {
+            "navigated_to": self.navigated_to,
+            "inside": self._inside.nonzero()[0].tolist(),
+            "first": [vars(snapshot) for snapshot in self._first.values()],
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See :meth:`state`."""
+        self.navigated_to = state["navigated_to"]
+        self._inside = type_mask(np.array(state["inside"], np.intp))
+        snapshots = (ObjectSnapshot(**values) for values in state["first"])
+        self._first = {snapshot.object_type: snapshot for snapshot in map(_with_tuples, snapshots)}
+
     def _choose(self, action: Action, objects: ObjectTable) -> ObjectSnapshot | None:
         """The object that a type stands for; None if the scene lacks the object of the task."""
         targets = self._targets.get(action.object_type)
@@ -177,6 +198,12 @@ class PaperActionHandler:
                 if object_id in target.contents:
                     return current_snapshot(self._setup.controller, object_id) or target
         return target
+
+
+def _with_tuples(snapshot: ObjectSnapshot) -> ObjectSnapshot:
+    """Plain data has lists in their place."""
+    x, y, z = snapshot.centre
+    return replace(snapshot, centre=(x, y, z), contents=tuple(snapshot.contents))
 
 
 _FLOOR = type_mask(np.array([KIND_OF[name] for name in verbs.NOWHERE]))

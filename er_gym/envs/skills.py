@@ -112,6 +112,20 @@ def place(controller: Any, pose: AgentPose, *, force: bool = False) -> Outcome:
     )
 
 
+def look(controller: Any) -> Perception:
+    """What the agent perceives now; a picture is drawn if the controller draws."""
+    calls = calls_of(controller)
+    calls.act("Pass")
+    return perception_of(calls.seen())
+
+
+def look_from(controller: Any, pose: AgentPose) -> Perception:
+    """What the agent perceives at a pose, where it stays."""
+    there = place(controller, pose, force=True).perception
+    assert there is not None  # a teleport tells what is seen
+    return there
+
+
 def start_pose(bounds: Mapping[str, Any], floor: Reachable) -> AgentPose:
     """The start pose: the reachable position nearest to a corner of the scene's bounds.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from er_gym.sim.protocol import rgba
 from er_gym.sim.render.view import View
 from er_gym.sim.settings import SOFT
 from er_gym.sim.world import World
+from er_gym.sim.world_state import restore_state, state_of
 
 import_client()
 
@@ -223,6 +225,23 @@ class EmbeddedController(ai2thor.controller.Controller):  # type: ignore[misc]  
         if not self.headless or self.server is None:
             return None
         return Direct(self.server.engine, self._let_go)
+
+    def world_state(self) -> dict[str, Any]:
+        """The state of the objects and the agent, see :mod:`er_gym.sim.world_state`."""
+        assert self.server is not None
+        return state_of(self.server.engine.world)
+
+    def restore_world(self, state: Mapping[str, Any]) -> None:
+        """Go back to a state of the same scene in the same arrangement.
+
+        Raises:
+            ValueError: it is of another one.
+        """
+        assert self.server is not None
+        self._let_go()
+        engine = self.server.engine
+        answer = engine.do(lambda world: restore_state(world, state))
+        assert not answer.error, answer.error
 
     def _let_go(self) -> None:
         self._last_event, self._stale = None, True

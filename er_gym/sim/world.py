@@ -136,6 +136,16 @@ class World(SceneObjects):
         self._displaced.update(rows)
         self.cache.objects_moved(rows)
 
+    def changed(self, rows: Iterable[int]) -> None:
+        """Note that objects may have changed in any way, and that others may have been added."""
+        self._displace(rows)
+        self.index = {object_id: i for i, object_id in enumerate(self.object_ids)}
+        by_type: dict[str, list[int]] = {}
+        for i, name in enumerate(self.types):
+            by_type.setdefault(name, []).append(i)
+        self._by_type = {name: tuple(rows) for name, rows in by_type.items()}
+        self._renested()
+
     def forget(self) -> None:
         """Empty all caches, so that readers compute their values again."""
         self.cache = WorldCache()

@@ -211,6 +211,22 @@ def digest(tasks: Iterable[Task]) -> str:
     return total.hexdigest()
 
 
+def task_lines(task: Task) -> tuple[str, ...]:
+    """The lines of a task in a file, without a header."""
+    return tuple(_lines([task]))
+
+
+def task_of_lines(lines: Iterable[str]) -> Task:
+    """The task of :func:`task_lines`.
+
+    Raises:
+        TaskFileError: the lines are not those of a task.
+    """
+    numbered = ((number, json.loads(line)) for number, line in enumerate(lines, 1))
+    *_, entry = _entries(numbered, Path("a saved task"))
+    return entry.read()
+
+
 def _lines(tasks: Iterable[Task]) -> Iterator[str]:
     """A line for each task; the line of an arrangement stands before its first task."""
     written: dict[str, Mapping[str, ObjectPose]] = {}

@@ -37,7 +37,7 @@ an episode (:func:`replay`). Only the paper's scorer has other rules. The judge'
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -103,6 +103,23 @@ class Progress:
     def start(criteria: Criteria) -> Progress:
         """The progress before the first step."""
         return Progress(criteria, (), criteria.key_actions)
+
+    @property
+    def numbers_done(self) -> list[int]:
+        """The places of the key actions done, among those of the task."""
+        found: list[int] = []
+        for key in self.done:  # a task may have the same one twice
+            numbers = (k for k, other in enumerate(self.criteria.key_actions) if other == key)
+            found.append(next(k for k in numbers if k not in found))
+        return found
+
+    @staticmethod
+    def at(criteria: Criteria, numbers_done: Sequence[int], ended: bool, success: bool) -> Progress:
+        """The progress of an episode in which some key actions are done, see
+        :attr:`numbers_done`."""
+        keys = criteria.key_actions
+        left = tuple(key for k, key in enumerate(keys) if k not in numbers_done)
+        return Progress(criteria, tuple(keys[k] for k in numbers_done), left, ended, success)
 
     @property
     def only_end_left(self) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pickle
 import re
 import runpy
 import subprocess
@@ -23,6 +22,7 @@ from er_gym.rollout.run_directory import RunDirectory
 Run = Callable[..., str]
 
 SHORT = (
+    "best_first_search",
     "compare_runs",
     "fork_episode",
     "own_agent",
@@ -161,12 +161,19 @@ def test_runs_are_compared(run_example: Run, run_directory: RunDirectory, episod
 
 
 def test_an_episode_is_saved_and_forked(run_example: Run, tmp_path: Path) -> None:
-    said = run_example("fork_episode", "mine.pickle")
+    said = run_example("fork_episode", "mine.snapshot")
     right, wrong = re.findall(r"success: (\w+)", said)
     assert (right, wrong) == ("True", "False")
-    saved = pickle.loads((tmp_path / "mine.pickle").read_bytes())
+    saved = EmbodiedEnv(obs_mode="text")
+    saved.restore((tmp_path / "mine.snapshot").read_bytes())
     assert saved.step("observe")[-1]["steps"] == 3  # the placing of the agent, one action, this
     saved.close()
+
+
+def test_a_search_solves_tasks(run_example: Run) -> None:
+    said = run_example("best_first_search", "2")
+    assert len(re.findall(r"^    .*, end$", said, re.MULTILINE)) == 2
+    assert "not solved" not in said
 
 
 def test_the_ai2thor_tutorial_runs_on_our_engine(

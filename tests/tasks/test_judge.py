@@ -257,3 +257,14 @@ def test_a_goal_to_have_a_sink_in_reach_is_met_by_its_basin() -> None:
     goal = [Condition("Sink", in_reach=True)]
     assert not unmet_conditions(goal, [entry(SINK, "Sink")], ["SinkBasin"])
     assert unmet_conditions(goal, [entry(SINK, "Sink")], ["BathtubBasin"])
+
+
+def test_progress_is_known_by_the_numbers_of_what_is_done() -> None:
+    criteria = Criteria((go(BOWL), take(EGG), put(BOWL), take(EGG), go(BOWL), END))
+    steps = [go(BOWL), take(EGG), go(BOWL), take(EGG), put(BOWL), END]
+    for count in range(len(steps) + 1):
+        progress = judge(criteria, *map(step, steps[:count]))
+        numbers = progress.numbers_done
+        assert len({*numbers}) == count
+        assert progress == Progress.at(criteria, numbers, progress.ended, progress.success)
+    assert progress.success

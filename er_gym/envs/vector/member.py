@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -66,7 +66,13 @@ class MemberEnv(EmbodiedEnv):
 
     def _begin(self, task: Task, faults: FaultPlan | None, replies: int | None) -> ResetResult:
         self._done = None
-        answer = super()._begin(task, faults, replies)
+        return self._joined(super()._begin(task, faults, replies))
+
+    def _resume(self, task: Task, state: Mapping[str, Any], replies: int | None) -> ResetResult:
+        self._done = None
+        return self._joined(super()._resume(task, state, replies))
+
+    def _joined(self, answer: ResetResult) -> ResetResult:
         if self._group is not None:
             assert isinstance(self._episode, MemberEpisode)
             self._episode.join(self._group, self._row)

@@ -43,7 +43,7 @@ def lines_of_sight(world: World) -> LinesOfSight:
 
 
 def _find(world: World) -> LinesOfSight:
-    base_world = world.base or _recorded_world(world.scene.name)
+    base_world = world.base or recorded_world(world.scene.name)
     base = lines_of_sight(base_world)
     if world.untouched:
         return base
@@ -59,7 +59,8 @@ def _find(world: World) -> LinesOfSight:
 
 
 @lru_cache(maxsize=128)
-def _recorded_world(scene_name: str) -> World:
+def recorded_world(scene_name: str) -> World:
+    """A scene as recorded, with its lines of sight; all share it, so it must not be changed."""
     world = World.load(load_scene(scene_name), Settings())
     world.cache.arrangement.put(_LINES_OF_SIGHT, compute_lines_of_sight(world))
     return world

@@ -1,0 +1,129 @@
+"""The state of a world as plain data: how its objects differ from the arranged room, and the agent.
+
+An episode changes few objects of a room. So the state lists these alone, with the exact bits of
+their numbers, and takes some hundred bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_gym.sim.agent import Agent
+from er_gym.sim.space.line_of_sight_builder import recorded_world
+from er_gym.sim.world import World
+
+_ARRAYS = (
+    *("position", "rotation", "low", "high", "obb", "properties", "states", "openness", "mass"),
+    "exists",
+)
+_LISTS = (
+    *("object_ids", "names", "types", "asset_ids", "temperature", "fill_liquid", "parents"),
+    *("controlled", "salient_materials"),
+)
+_TUPLES = frozenset({"parents", "controlled", "salient_materials"})
+"""The lists whose entries are tuples, or None."""
+_SETS = ("remains", "touched", "_displaced")
+
+
+def state_of(world: World) -> dict[str, Any]:
+    """The state of a world, of numbers, texts, bytes, lists and dictionaries by name.
+
+    It holds in any world of the same scene in the same arrangement (``SetObjectPoses``). Settings
+    and third-party cameras are no part of it.
+    """
+    base = _base(world)
+    changed = {
+        **{name: _changed_rows(getattr(world, name), getattr(base, name)) for name in _ARRAYS},
+        **{name: _changed_entries(getattr(world, name), getattr(base, name)) for name in _LISTS},
+    }
+    agent = world.agent
+    return {
+        "objects": len(world),
+        "changed": {name: rows for name, rows in changed.items() if rows is not None},
+        "sets": {name: sorted(getattr(world, name)) for name in _SETS},
+        "held": world.held,
+        "disabled": [[i, list(rows)] for i, rows in world.disabled.items()],
+        "listed": None if world.listed is None else sorted(world.listed),
+        "untouched": world.untouched,
+        "agent": [*agent.position.tolist(), agent.rotation, agent.horizon, agent.standing],
+    }
+
+
+def restore_state(world: World, state: Mapping[str, Any]) -> None:
+    """Put a world into a state of :func:`state_of`.
+
+    Raises:
+        ValueError: the state is not of this scene in this arrangement.
+    """
+    base = _base(world)
+    count = state["objects"]
+    if count < len(base):
+        raise ValueError(f"the state has {count} objects, and the room {len(base)}")
+    own_base = world.base
+    world.restore(base)
+    world.base = own_base
+    changed: set[int] = set()
+    for name, rows in state["changed"].items():
+        if name in _ARRAYS:
+            setattr(world, name, _with_rows(getattr(world, name), rows, count))
+        else:
+            setattr(world, name, _with_entries(getattr(world, name), rows, name in _TUPLES))
+        changed.update(rows[0])
+    if changed:
+        world.changed(changed)
+    for name in _SETS:
+        setattr(world, name, set(state["sets"][name]))
+    world.held = state["held"]
+    world.disabled = {i: tuple(rows) for i, rows in state["disabled"]}
+    world.listed = None if state["listed"] is None else frozenset(state["listed"])
+    world.untouched = state["untouched"]
+    x, y, z, rotation, horizon, standing = state["agent"]
+    # The hand is where its object says, so nothing is carried.
+    world.agent = Agent(np.array([x, y, z]), rotation, horizon, standing)
+    world.cache.state_changed()
+
+
+def _base(world: World) -> World:
+    return world.base or recorded_world(world.scene.name)
+
+
+def _changed_rows(now: NDArray[Any], before: NDArray[Any]) -> list[Any] | None:
+    """The rows that differ and their content, None for none; rows at the end may be new."""
+    own, other = _as_bytes(now), _as_bytes(before)
+    count = len(before)
+    rows = np.flatnonzero((own[:count] != other).any(axis=1)).tolist()
+    rows += range(count, len(now))
+    return [rows, own[rows].tobytes()] if rows else None
+
+
+def _with_rows(before: NDArray[Any], rows: Sequence[Any], count: int) -> NDArray[Any]:
+    numbers, content = rows
+    found = before
+    if len(before) < count:
+        more = np.zeros((count - len(before), *before.shape[1:]), before.dtype)
+        found = np.concatenate([before, more])
+    found[numbers] = np.frombuffer(content, before.dtype).reshape(-1, *before.shape[1:])
+    return found
+
+
+def _as_bytes(array: NDArray[Any]) -> NDArray[np.uint8]:
+    """(N, B) the bytes of each row: not-a-number equals itself, and -0.0 is not 0.0."""
+    return np.ascontiguousarray(array).view(np.uint8).reshape(len(array), -1)
+
+
+def _changed_entries(now: Sequence[Any], before: Sequence[Any]) -> list[Any] | None:
+    rows = [i for i, (one, other) in enumerate(zip(now, before, strict=False)) if one != other]
+    rows += range(len(before), len(now))
+    return [rows, [now[i] for i in rows]] if rows else None
+
+
+def _with_entries(before: Sequence[Any], rows: Sequence[Any], tuples: bool) -> list[Any]:
+    found = list(before)
+    for i, entry in zip(*rows, strict=True):
+        value = tuple(entry) if tuples and entry is not None else entry
+        found[i : i + 1] = [value]  # at the end, this adds it
+    return found
