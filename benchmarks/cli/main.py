@@ -34,6 +34,7 @@ from benchmarks.cli.options import FOLDER, scorer_option
 from benchmarks.cli.player import player
 from benchmarks.cli.prompts import prompts
 from benchmarks.cli.render import play, render
+from benchmarks.cli.replay import replay
 from benchmarks.cli.serve import match_server, serve
 from benchmarks.cli.study import ablate, ladder
 from benchmarks.cli.tasks import tasks
@@ -102,6 +103,7 @@ cli.add_command(player)
 cli.add_command(doctor)
 cli.add_command(render)
 cli.add_command(play)
+cli.add_command(replay)
 cli.add_command(tasks)
 cli.add_command(train_rl)
 cli.add_command(finetune)

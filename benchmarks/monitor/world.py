@@ -112,7 +112,7 @@ class Worlds:
             if name in self._kept:
                 self._kept.move_to_end(name)
                 return self._kept[name]
-            task = _task(manifest, record)
+            task = task_of(manifest, record)
             angle = _horizontal(manifest.env)
             found = _played_again(self._environment(manifest), task, record, angle)
             self._kept[name] = found
@@ -127,12 +127,12 @@ class Worlds:
             CannotReplay: as above, or there is no such step.
         """
         with self._lock:
-            task = _task(manifest, record)
+            task = task_of(manifest, record)
             env = self._environment(manifest)
             env.reset(seed=record.seed, options={"task": task})
             for step in record.steps[1 : number + 1]:
                 if not step.appended:
-                    env.step(_action(step.verb, step.object_type))
+                    env.step(action_in(step.verb, step.object_type))
             picture = env.render()
             if not isinstance(picture, np.ndarray):
                 raise CannotReplay("nothing is drawn")
@@ -149,11 +149,11 @@ class Worlds:
         """
         with self._lock:
             env = self._environment(manifest)
-            env.reset(seed=record.seed, options={"task": _task(manifest, record)})
+            env.reset(seed=record.seed, options={"task": task_of(manifest, record)})
             for number, step in enumerate(record.steps):
                 if number and not step.appended:
                     try:
-                        env.step(_action(step.verb, step.object_type))
+                        env.step(action_in(step.verb, step.object_type))
                     except ValueError:
                         return
                 picture = env.render()
@@ -162,20 +162,34 @@ class Worlds:
                 yield np.asarray(picture)
 
     def _environment(self, manifest: Manifest) -> EmbodiedEnv:
-        if manifest.env.get("backend", "embedded") != "embedded":
-            raise CannotReplay("it was played on another backend, which does not repeat itself")
         if self._env is None or self._env[0] != manifest.digest:
             if self._env is not None:
                 self._env[1].close()
-            given = {**manifest.env, "obs_mode": "text", "render_mode": "rgb_array"}
-            try:
-                self._env = manifest.digest, EmbodiedEnv((), **given)
-            except (TypeError, ValueError) as error:
-                raise CannotReplay(str(error)) from None
+            self._env = manifest.digest, environment_of(manifest)
         return self._env[1]
 
 
-def _task(manifest: Manifest, record: EpisodeRecord) -> Task:
+def environment_of(manifest: Manifest) -> EmbodiedEnv:
+    """An environment like that of a run, with texts as observations; it renders pictures.
+
+    Raises:
+        CannotReplay: the run was not played on the embedded engine.
+    """
+    if manifest.env.get("backend", "embedded") != "embedded":
+        raise CannotReplay("it was played on another backend, which does not repeat itself")
+    given = {**manifest.env, "obs_mode": "text", "render_mode": "rgb_array"}
+    try:
+        return EmbodiedEnv((), **given)
+    except (TypeError, ValueError) as error:
+        raise CannotReplay(str(error)) from None
+
+
+def task_of(manifest: Manifest, record: EpisodeRecord) -> Task:
+    """The task of an episode.
+
+    Raises:
+        CannotReplay: it is not at hand.
+    """
     # Only er-gym's own suites: another name could be a module, which would be run.
     if manifest.suite not in suite_names():
         raise CannotReplay(f"{manifest.suite} is none of er-gym's own suites")
@@ -193,7 +207,8 @@ def _tasks(name: str) -> tuple[str, Mapping[str, Task]]:
     return suite.digest, {task.id: task for task in suite.tasks}
 
 
-def _action(verb: str, object_type: str) -> Action | str:
+def action_in(verb: str, object_type: str) -> Action | str:
+    """What was said to the environment in a step of a record."""
     return NO_ACTION if verb == ERROR else Action(verb, object_type)
 
 
@@ -205,7 +220,7 @@ def _played_again(env: EmbodiedEnv, task: Task, record: EpisodeRecord, angle: fl
         if step.appended:
             break
         try:
-            _, _, over, cut, info = env.step(_action(step.verb, step.object_type))
+            _, _, over, cut, info = env.step(action_in(step.verb, step.object_type))
         except ValueError:
             differs = number
             break

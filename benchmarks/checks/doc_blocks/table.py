@@ -102,6 +102,7 @@ NEVER: Mapping[str, tuple[str, ...]] = {
         "er_gym/tasks/data/train.md: er-gym tasks generate",
     ),
     "names something of the reader's own": (
+        "README.md: er-gym replay",
         "docs/data.md: er-gym data show",
         "docs/ladder.md: er-gym new-model --from-gguf",
     ),
