@@ -10,10 +10,10 @@
     task = er_gym.load_suite("mini").tasks[0]
     record = er_gym.play_episode(env, agent, task, seed=0)
 
-A name is that of one of :data:`AGENTS` (``oracle``, ``random``, ``searcher``), a class of your own
-(``package.module:Class``), a trained policy (``rl:RUN``), a model of the zoo (``zoo:NAME``), or a
-model agent (``openai:MODEL``, ``hf:PATH``). ``examples/own_agent.py`` writes one;
-``docs/agents.md`` explains those that ask models.
+A name is that of one of :data:`AGENTS` (``oracle``, ``random``, ``searcher``, ``mask-reader``), a
+class of your own (``package.module:Class``), a trained policy (``rl:RUN``), a model of the zoo
+(``zoo:NAME``), or a model agent (``openai:MODEL``, ``hf:PATH``). ``examples/own_agent.py`` writes
+one; ``docs/agents.md`` explains those that ask models.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from agents.factory import (
 from agents.scripted.oracle import OracleAgent
 from agents.scripted.random import RandomAgent
 from agents.scripted.searcher import SearcherAgent
+from agents.scripted.searcher.mask_reader import MaskReaderAgent
 from agents.zoo.index import PREFIX as ZOO_PREFIX
 from agents.zoo.index import resolved
 from er_gym.activity import begin_import
@@ -59,7 +60,12 @@ RL_PREFIX = "rl:"
 AGENTS: Registry[Callable[..., Agent]] = Registry(
     kind="agent",
     group="er_gym.agents",
-    own={"oracle": OracleAgent, "random": RandomAgent, "searcher": SearcherAgent},
+    own={
+        "oracle": OracleAgent,
+        "random": RandomAgent,
+        "searcher": SearcherAgent,
+        "mask-reader": MaskReaderAgent,
+    },
     expected="an agent's class (er_gym.rollout.agent.Agent), or a function that makes an agent",
     fits=callable,
     others=f"{RL_PREFIX}RUN with a run directory of er-gym train-rl; {ZOO_PREFIX}NAME with a model "

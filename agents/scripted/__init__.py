@@ -1,1 +1,1 @@
-"""Agents without a model: the oracle, the random one, and the searcher."""
+"""Agents without a model: the oracle, the random one, the searcher, and the mask reader."""

@@ -1,4 +1,8 @@
-"""The upper bound of every comparison: an agent that knows the key actions."""
+"""An agent that knows the key actions: it shows that tasks can be solved.
+
+It is no upper bound where the environment chooses which object a name means by the agent's way
+(``instances="explore"``): there it goes by ids that the environment does not heed.
+"""
 
 from __future__ import annotations
 

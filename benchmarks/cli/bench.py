@@ -67,7 +67,7 @@ class BenchOptions(OptionGroup):
     agent: str = option(
         type=Words(),
         required=True,
-        help="The agent: oracle, random, searcher, zoo:NAME, rl:RUN, openai:MODEL, "
+        help="The agent: oracle, random, searcher, mask-reader, zoo:NAME, rl:RUN, openai:MODEL, "
         "package.module:Class …",
     )
     out: Path | None = option(type=FOLDER, help="The run directory.  [default: runs/SUITE-AGENT]")

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import pytest
 
 from agents import AGENTS, make_agent
+from agents.scripted.searcher.agent import StepView
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.scorers import CORRECTED, PAPER
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -66,6 +70,26 @@ def test_the_oracle_finds_its_way_without_being_told_where_it_may_go() -> None:
     assert all(task.navigable_objects == () for task in suite.tasks)
     records = play_all("oracle", suite.tasks[:40])
     assert any(step.verb == "observe" for record in records for step in record.steps)
+
+
+def test_the_mask_reader_goes_from_a_to_z_until_it_reads_what_is_asked_for() -> None:
+    tasks = load_suite("mini").tasks[::6]
+    records = play_all("mask-reader", tasks)
+    assert 0.9 < sum(record.success for record in records) / len(records)
+    agent = make_agent("mask-reader")
+    agent.reset(tasks[0], {}, {})
+    agent._view = replace(StepView.of(mask_info()), navigable=("Sofa", "Bed", "Desk", "Mug"))
+    assert agent._best_place("Mug", {}) == "Mug"
+    assert agent._best_place("Egg", {}) == "Bed"
+    assert agent._best_place("Egg", {"Bed": 1}) == "Desk"
+    assert agent._best_place("Egg", {"Bed": 2, "Desk": 1, "Mug": 1, "Sofa": 1}) == "Desk"
+
+
+def mask_info() -> dict[str, Any]:
+    env = EmbodiedEnv(obs_mode="text")
+    _, info = env.reset(seed=0)
+    env.close()
+    return info
 
 
 def test_an_unknown_agent_lists_those_there_are() -> None:
