@@ -75,7 +75,7 @@ def test_the_oracle_finds_its_way_without_being_told_where_it_may_go() -> None:
 def test_the_mask_reader_goes_from_a_to_z_until_it_reads_what_is_asked_for() -> None:
     tasks = load_suite("mini").tasks[::6]
     records = play_all("mask-reader", tasks)
-    assert 0.9 < sum(record.success for record in records) / len(records)
+    assert sum(record.success for record in records) / len(records) > 0.9
     agent = make_agent("mask-reader")
     agent.reset(tasks[0], {}, {})
     agent._view = replace(StepView.of(mask_info()), navigable=("Sofa", "Bed", "Desk", "Mug"))
