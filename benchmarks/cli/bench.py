@@ -25,6 +25,7 @@ from benchmarks.cli.options import (
     EXISTING_FILE,
     FOLDER,
     MOST_SAMPLES,
+    MOST_SEED,
     OptionGroup,
     Words,
     faults_option,
@@ -37,7 +38,7 @@ from benchmarks.cli.options import (
     split,
     with_options,
 )
-from benchmarks.cli.suites import fitted_tasks, suite_given
+from benchmarks.cli.suites import fitted_tasks, fresh_suite, suite_given
 from benchmarks.cli.vlm_options import VLMOptions
 from benchmarks.terminal import stdout, terminal
 
@@ -60,6 +61,11 @@ class BenchOptions(OptionGroup):
     """What is played, by whom, by which rules, and where the run is written."""
 
     suite: str | None = option(help="A bundled suite; `er-gym suites` lists them.")
+    fresh: int | None = option(
+        type=click.IntRange(0, MOST_SEED),
+        metavar="SEED",
+        help="Play new tasks, made as the suite's configuration says, from another seed.",
+    )
     tasks_file: Path | None = option(type=EXISTING_FILE, help="A task file in the paper's format.")
     poses: Path | None = option(
         type=EXISTING_FILE, help="A file of exact object poses in the paper's format."
@@ -140,7 +146,7 @@ def bench(options: BenchOptions, executor_options: ExecutorOptions, vlm_options:
     with bad_input(BackendError):
         part = Shard.parse(options.shard) if options.shard is not None else None
         doing("reading the suite")
-        suite = _load_suite(options)
+        suite = _load_suite(options, executor_options.workers)
         doing("preparing the agent")
         vlm_run = _vlm_run(agent, vlm_options)
         env = _env_kwargs(suite, options, vlm_run)
@@ -292,13 +298,18 @@ def _prepared_run(
         )
 
 
-def _load_suite(options: BenchOptions) -> Suite:
+def _load_suite(options: BenchOptions, workers: int | None) -> Suite:
     """The suite; under the paper's protocol a pose holds for its object in every task."""
     from er_gym.envs.protocol import PAPER
     from er_gym.tasks.jsonl_format import digest
     from er_gym.tasks.paper_format import read_poses, with_every_pose, with_poses
 
-    suite = suite_given(options.suite, options.tasks_file)
+    if options.fresh is None:
+        suite = suite_given(options.suite, options.tasks_file)
+    elif options.tasks_file is not None:
+        raise BadInput("give --fresh or --tasks-file, not both")
+    else:
+        suite = fresh_suite(options.suite, options.fresh, workers or 1)
     if options.poses is not None and options.tasks_file is None:
         raise BadInput("--poses needs --tasks-file; a suite has its own poses")
     stated = {} if options.poses is None else read_poses(options.poses)

@@ -37,7 +37,9 @@ _DEFAULT_TOTAL = 100
     "--total", type=click.IntRange(min=1), help=f"The number of tasks.  [default: {_DEFAULT_TOTAL}]"
 )
 @click.option(
-    "--scenes", metavar="NAMES", help="all, training, evaluation, or scenes separated by commas."
+    "--scenes",
+    metavar="NAMES",
+    help="all, training, validation, evaluation, or scenes separated by commas.",
 )
 @click.option("--types", metavar="NAMES", help="Task types, separated by commas.  [default: all]")
 @click.option(

@@ -66,7 +66,7 @@ class RoomBuilder:
         """The tasks of a room, in all its arrangements."""
         rng = random.Random(f"{self._seed}/{scene}")
         # Drawn too, so that two suites do not share arrangements; 0 is the recorded one.
-        layouts = [0, *rng.sample(range(1, 10**6), self._spec.layouts)]
+        layouts = [0] * self._spec.recorded + rng.sample(range(1, 10**6), self._spec.layouts)
         made = BuildResult()
         for layout in layouts:
             made = made.plus(self._of(generator_for(self._controller, scene, layout), rng))

@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
+
 from benchmarks.cli.errors import BadInput
 
 if TYPE_CHECKING:
@@ -31,6 +33,32 @@ def suite_given(name: str | None, tasks_file: Path | None) -> Suite:
     if name is None:
         raise BadInput(f"give --suite (one of: {', '.join(suite_names())}) or --tasks-file")
     return load_suite(name)
+
+
+def fresh_suite(name: str | None, seed: int, workers: int) -> Suite:
+    """The tasks that a suite's configuration gives for another seed.
+
+    They are made once, in :func:`~er_gym.tasks.suites.suite_home`.
+
+    Raises:
+        BadInput: no suite is named.
+        ValueError: er-gym has no such suite.
+        click.exceptions.Exit: they could not be made; the reason has been printed.
+    """
+    from benchmarks.cli.generate import generate
+    from er_gym.tasks.suites import suite_config, suite_from_file, suite_home
+
+    if name is None:
+        raise BadInput("--fresh needs --suite: it makes tasks as that suite's configuration says")
+    config, file = suite_config(name), suite_home() / f"{name}-fresh-{seed}.jsonl.gz"
+    if config.seed == seed:
+        raise BadInput(f"--fresh {seed}: {name} itself has this seed; give another one")
+    if not file.exists():
+        asked = ["--suite", name, "--seed", str(seed), "--out", str(file)]
+        code = generate.main([*asked, "--workers", str(workers)], standalone_mode=False)
+        if code:
+            raise click.exceptions.Exit(code)
+    return replace(suite_from_file(file), env=config.env)
 
 
 def chosen_tasks(suite: Suite, types: Sequence[str], scenes: Sequence[str]) -> Suite:

@@ -21,7 +21,9 @@ _ALSO_HELD_OUT = ("FloorPlan4", "FloorPlan22", "FloorPlan27")
 TRAINING_SCENES = tuple(
     name for name in SCENE_NAMES if name not in (*EVALUATION_SCENES, *_ALSO_HELD_OUT)
 )
-"""All scenes without a known test task of the paper."""
+"""All scenes without a test task of the paper that was known when ``train`` was made."""
+VALIDATION_SCENES = tuple(name for name in TRAINING_SCENES if name != "FloorPlan7")
+"""The training scenes without FloorPlan7, where one of the paper's test tasks plays."""
 UNSEEN_TYPES = frozenset({
     "AlarmClock", "Kettle", "Ladle", "Newspaper", "SprayBottle", "Statue", "TissueBox", "Watch",
 })
@@ -30,6 +32,7 @@ UNSEEN_TYPES = frozenset({
 SCENES: Mapping[str, tuple[str, ...]] = {
     "all": SCENE_NAMES,
     "training": TRAINING_SCENES,
+    "validation": VALIDATION_SCENES,
     "evaluation": EVALUATION_SCENES,
 }
 """Sets of scenes by name."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from er_gym.tasks.difficulty import Difficulty
 from er_gym.tasks.splits import SCENES
@@ -24,6 +24,7 @@ class SuiteSpec(BaseModel):
         scenes: the name of a set of scenes (:data:`~er_gym.tasks.splits.SCENES`), or scene names.
         types: names of task types; all types if it is empty.
         layouts: the number of arrangements of each scene, besides the recorded one.
+        recorded: whether tasks begin in the recorded arrangement, too.
         per_layout: the number of candidates of each type from each arrangement.
         unseen_objects: whether tasks may be about the types that training does not see
             (:data:`~er_gym.tasks.splits.UNSEEN_TYPES`).
@@ -37,6 +38,7 @@ class SuiteSpec(BaseModel):
     scenes: str | tuple[str, ...] = "all"
     types: tuple[str, ...] = ()
     layouts: int = Field(0, ge=0, le=10_000)
+    recorded: bool = True
     per_layout: int = Field(3, gt=0)
     unseen_objects: bool = True
     hidden_depth: Span = (0, None)
@@ -68,6 +70,12 @@ class SuiteSpec(BaseModel):
         if not (math.isfinite(low) and (high is None or low <= high < math.inf)):
             raise ValueError(f"not a range: from {low:g} to {high}; give the smaller number first")
         return span
+
+    @model_validator(mode="after")
+    def _some_arrangement(self) -> SuiteSpec:
+        if not (self.recorded or self.layouts):
+            raise ValueError("recorded is false, so give at least one of layouts")
+        return self
 
     @property
     def rooms(self) -> Sequence[str]:

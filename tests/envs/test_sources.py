@@ -148,7 +148,10 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         {"scene": "FloorPlan999"},
         r"the suite mini has no single_pickup tasks in FloorPlan999 among its 132 tasks",
     ),
-    "no such suite": ({"suite": "maxi"}, r"unknown suite 'maxi'; choose one of: er-1k, mini"),
+    "no such suite": (
+        {"suite": "maxi"},
+        r"unknown suite 'maxi'; choose one of: er-1k, er-val, mini",
+    ),
     "no such file": ({"suite": "no/such.jsonl"}, r"no/such\.jsonl: no such file"),
     "another kind of file": ({"suite": "some/tasks.csv"}, r"a task file ends in \.json"),
 }
