@@ -234,6 +234,7 @@ REFUSED = [
     ("TeleportFull", {"rotation": NAN}, "rotation"),
     ("GetReachablePositions", {"gridSize": 0}, "grid"),
     ("GetReachablePositions", {"maxStepCount": 1}, "Too many steps"),
+    ("GetReachablePositions", {"maxStepCount": 1, "gridSize": 1e308}, "Too many steps"),
     ("GetInteractablePoses", {"objectId": FRIDGE, "rotations": [NAN]}, "rotations"),
     ("GetInteractablePoses", {"objectId": FRIDGE, "horizons": "all"}, "horizons"),
     ("GetInteractablePoses", {"objectId": FRIDGE, "maxPoses": 0}, "maxPoses"),

@@ -110,7 +110,7 @@ def get_reachable_positions(
     """
     places = _grid(world, gridSize, directionsRelativeAgent)
     step = world.settings.grid_size if gridSize is None else gridSize
-    if maxStepCount is not None and len(places) > maxStepCount // step**2:
+    if maxStepCount is not None and len(places) > maxStepCount // (step * step):
         raise ActionFailed("Too many steps taken in GetReachablePositions.")
     # Programs look the agent's position up among these, so it must be equal to the last digit.
     own = world.agent.position[[0, 2]]

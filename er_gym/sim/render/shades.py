@@ -178,6 +178,7 @@ def _veil(
     rows = []
     for k, each in enumerate(prints):
         dark = (_DARK + _DARKER * min(1.0, each.tall / _TALL)) * (1.0 - each.above / _FADES)
+        dark = min(dark, 1.0)  # what was pushed deep into the floor is below its shadow
         if dark > 0.0:
             rows.append(_rows(each, dark, ground, shift))
             layer = 1 + (order + k) % _LAYERS

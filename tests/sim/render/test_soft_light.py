@@ -201,6 +201,17 @@ def _frame(**arguments: Any) -> np.ndarray:
     return np.asarray(frame)
 
 
+def test_what_was_pushed_below_the_floor_can_be_drawn() -> None:
+    """Its shadow would be darker than black."""
+    world = world_of("FloorPlan215")
+    statue = next(world.of_type("Statue"))
+    world.relocate(statue, ())
+    world.set_pose(statue, world.position[statue] - [0.0, 5.0, 0.0], world.rotation[statue])
+    shade = shade_of(world, statue, 0, bake_of("FloorPlan215").day)
+    assert shade is not None
+    assert shade.vertices["colour"][:, 3].max() == 255
+
+
 def test_the_light_is_chosen_for_each_controller_and_outlives_a_reset() -> None:
     world = world_of("FloorPlan301")
     for light in ("soft", "flat"):
