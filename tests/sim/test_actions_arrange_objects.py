@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from math import cos, hypot, radians, sin
 
+import numpy as np
 import pytest
 from floor_plan_1 import APPLE, FRIDGE, ISLAND
 
 from benchmarks.checks.invariants import broken
 from er_gym.sim.actions.arrange_objects import id_of_place
+from er_gym.sim.controller import EmbeddedController
 from er_gym.sim.placement_restrictions import accepts
 from er_gym.sim.scene import SCENE_NAMES, load_scene
 
@@ -350,3 +352,39 @@ def test_throwing_without_force_is_dropping(enter):
 def test_an_empty_hand_throws_nothing(kitchen):
     assert "empty" in kitchen.refused("ThrowObject", moveMagnitude=100)
     assert "moveMagnitude" in kitchen.refused("ThrowObject", moveMagnitude=-1)
+
+
+@pytest.mark.parametrize("scene", ["FloorPlan224", "FloorPlan7", "FloorPlan301"])
+def test_what_rests_stays_where_it_is_put_and_the_rest_falls(scene: str) -> None:
+    """A rearrangement's poses are those of things at rest: on chairs, too, whose boxes hold air."""
+    with EmbeddedController(scene=scene, headless=True) as controller:
+        controller.step("InitialRandomSpawn", randomSeed=1)
+        loose = [
+            entry
+            for entry in controller.last_event.metadata["objects"]
+            if entry["pickupable"] or entry["moveable"]
+        ]
+        poses = [
+            {"objectName": o["name"], "position": dict(o["position"]), "rotation": o["rotation"]}
+            for o in loose
+        ]
+        controller.reset(scene)
+        event = controller.step("SetObjectPoses", objectPoses=poses, placeStationary=False)
+        now = {entry["name"]: entry for entry in event.metadata["objects"]}
+        away = [
+            max(abs(now[o["name"]]["position"][axis] - o["position"][axis]) for axis in "xyz")
+            for o in loose
+        ]
+        assert np.mean(np.array(away) < 0.01) > 0.95
+        tables = ("CounterTop", "DiningTable", "CoffeeTable", "Desk", "Dresser")
+        high = next(
+            o
+            for o in loose
+            if o["pickupable"] and o["parentReceptacles"][0].split("|")[0] in tables
+        )
+        pose = next(pose for pose in poses if pose["objectName"] == high["name"])
+        pose["position"]["y"] += 0.3
+        controller.reset(scene)
+        event = controller.step("SetObjectPoses", objectPoses=poses, placeStationary=False)
+        fallen = next(e for e in event.metadata["objects"] if e["name"] == high["name"])
+        assert fallen["position"]["y"] < pose["position"]["y"] - 0.2

@@ -16,7 +16,7 @@ from er_gym.sim.actions.registry import action, quoted
 from er_gym.sim.actions.vectors import Vector
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.placement_restrictions import accepts
-from er_gym.sim.space.placement import free_spots
+from er_gym.sim.space.placement import free_spots, surface_height
 from er_gym.sim.space.receptacles import receptacles_of
 from er_gym.sim.world import World
 
@@ -26,6 +26,9 @@ _arranged: OrderedDict[tuple[object, ...], World] = OrderedDict()
 
 _SAME, _RELATIVE = 1e-3, 1e-5
 """An object whose coordinates and angles change by less has not moved; metres and degrees."""
+
+_RESTING = 0.05
+"""What is no higher above the surface of its receptacle lies on it, metres."""
 
 
 class ObjectPose(BaseModel):
@@ -110,13 +113,22 @@ def set_object_poses(
         world.relocate_alone(i, receptacles_of(world, i))
     if not placeStationary:
         for i in moved:
-            fall(world, i, (world.low[i] + world.high[i]) / 2)
+            if not _rests(world, i):
+                fall(world, i, (world.low[i] + world.high[i]) / 2)
     _name_after_places(world, moved)
     consequences.apply(world)
     if fresh:
         _arranged[wanted] = world.snapshot()
         if len(_arranged) > _ARRANGEMENTS:
             _arranged.popitem(last=False)
+
+
+def _rests(world: World, i: int) -> bool:
+    """Whether object i lies in or on a receptacle, and not in the air above it."""
+    return any(
+        world.has(holder, "openable") or world.low[i, 1] <= surface_height(world, holder) + _RESTING
+        for holder in world.parents[i]
+    )
 
 
 def _key(pose: ObjectPose) -> tuple[object, ...]:
