@@ -22,8 +22,6 @@ _ENDINGS_OF_DEPTH = (".png", ".tif", ".tiff")
 """The formats that hold 16 bits."""
 _DEPTH_UNIT = 1000.0
 """Steps per metre in a depth picture, which has 16 bits."""
-_TOP_VIEW_FOV = 60.0
-"""Vertical field of view of the camera of ``map``, which looks down on the whole room; degrees."""
 
 
 @click.command()
@@ -142,18 +140,10 @@ def _teleport(controller: Any, pose: tuple[float, float, float, float]) -> None:
 
 def _top_view(controller: Any) -> Any:
     """An event with a picture of the whole room from above; the ceiling is not drawn from there."""
-    from math import radians, tan
-
-    bounds = controller.last_event.metadata["sceneBounds"]
-    middle, size = bounds["center"], bounds["size"]
-    aspect = controller.last_event.screen_width / controller.last_event.screen_height
-    up = max(size["z"], size["x"] / aspect) / 2 / tan(radians(_TOP_VIEW_FOV) / 2)
-    return controller.step(
-        action="AddThirdPartyCamera",
-        position={"x": middle["x"], "y": middle["y"] + size["y"] / 2 + up, "z": middle["z"]},
-        rotation={"x": 90, "y": 0, "z": 0},
-        fieldOfView=_TOP_VIEW_FOV,
-    )
+    event = controller.step(action="GetMapViewCameraProperties")
+    camera, aspect = event.metadata["actionReturn"], event.screen_width / event.screen_height
+    size = camera["orthographicSize"] / min(1.0, aspect)
+    return controller.step(action="AddThirdPartyCamera", **{**camera, "orthographicSize": size})
 
 
 @click.command()

@@ -12,6 +12,7 @@ import numpy as np
 from er_gym.sim.agent import HAND_OFFSET
 from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.sim.object_metadata import box, objects, vector
+from er_gym.sim.space.map_camera import map_camera
 from er_gym.sim.space.room_bounds import room_bounds
 from er_gym.sim.world import World
 
@@ -82,6 +83,12 @@ def _third_party_cameras(world: World) -> list[dict[str, Any]]:
     ]
 
 
+def _orthographic_size(world: World) -> float:
+    """Of the agent's camera, metres; 0 in perspective."""
+    size = map_camera(world.scene.name).orthographic_size if world.map_view else None
+    return 0.0 if size is None else size
+
+
 def inventory(world: World) -> list[dict[str, str]]:
     """The object in the agent's hand."""
     if world.held < 0:
@@ -118,7 +125,7 @@ def metadata(
         "isSceneAtRest": True,
         "arm": None,
         "fov": settings.field_of_view,
-        "cameraOrthSize": 0.0,
+        "cameraOrthSize": _orthographic_size(world),
         "collided": False,
         "collidedObjects": [],
         "sceneName": f"{world.scene.name}_physics",

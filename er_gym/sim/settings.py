@@ -43,8 +43,11 @@ class ThirdPartyCamera:
         position: x, y and z, metres, world frame.
         rotation: Unity's Euler angles about x, y and z, degrees.
         field_of_view: vertical, degrees.
+        orthographic_size: half of what an orthographic camera sees from bottom to top, metres; None
+            for a camera in perspective.
     """
 
     position: tuple[float, float, float]
     rotation: tuple[float, float, float]
     field_of_view: float
+    orthographic_size: float | None = None

@@ -42,7 +42,9 @@ def reversible_offset(offset: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.round(offset / _STEP) * _STEP)
 
 
-_KEPT_APART = frozenset({"scene", "settings", "agent", "cameras", "cache", "base", "listed"})
+_KEPT_APART = frozenset(
+    {"scene", "settings", "agent", "cameras", "map_view", "cache", "base", "listed"}
+)
 """Fields that a snapshot of the objects does not copy."""
 
 
@@ -54,6 +56,7 @@ class World(SceneObjects):
         settings: what ``Initialize`` set.
         agent: the agent's pose.
         cameras: the third-party cameras.
+        map_view: whether the agent's picture shows the room from above (``ToggleMapView``).
         base: a snapshot of the arrangement that ``SetObjectPoses`` made last, None if it made
             none. It must not be changed.
     """
@@ -62,6 +65,7 @@ class World(SceneObjects):
     agent: Agent
     base: World | None = None
     cameras: tuple[ThirdPartyCamera, ...] = ()
+    map_view: bool = False
 
     @staticmethod
     def load(scene: Scene, settings: Settings) -> World:

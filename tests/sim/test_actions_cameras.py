@@ -135,8 +135,9 @@ def test_roll_turns_the_picture(drawing):
 @pytest.mark.parametrize(
     ("action", "arguments", "named"),
     [
-        ("AddThirdPartyCamera", {**EYE, "orthographic": True}, "perspective only"),
         ("AddThirdPartyCamera", {**EYE, "orthographicSize": 2}, "orthographic=True"),
+        ("AddThirdPartyCamera", {**EYE, "orthographic": True, "orthographicSize": 0}, "above 0"),
+        ("AddThirdPartyCamera", {**EYE, "orthographic": True, "orthographicSize": 1e6}, "1000"),
         ("AddThirdPartyCamera", {**EYE, "position": 5}, "position"),
         ("UpdateThirdPartyCamera", {}, "AddThirdPartyCamera makes one"),
         ("UpdateThirdPartyCamera", {"thirdPartyCameraId": -1}, "camera -1"),
@@ -162,6 +163,90 @@ def test_wrong_calls_raise_value_error(drawing, arguments, named):
     with pytest.raises(ValueError, match=named):
         drawing.step("AddThirdPartyCamera", **arguments)
     assert drawing.step("Pass").metadata["thirdPartyCameras"] == []
+
+
+# -- maps -----------------------------------------------------------------------------------------
+
+
+SIZE = 120
+IMAGES = {"renderDepthImage": True, "renderInstanceSegmentation": True}
+
+
+@pytest.fixture
+def above():
+    """A square picture of all kinds, whose controller is stopped in the end."""
+    controller = EmbeddedController(scene="FloorPlan1", width=SIZE, height=SIZE, **IMAGES)
+    yield controller
+    controller.stop()
+
+
+def test_a_map_shows_each_thing_where_it_is(above):
+    camera = above.step("GetMapViewCameraProperties").metadata["actionReturn"]
+    bounds = above.last_event.metadata["sceneBounds"]
+    assert camera["position"]["x"] == pytest.approx(bounds["center"]["x"])
+    assert camera["position"]["y"] == pytest.approx(bounds["center"]["y"] + bounds["size"]["y"] / 2)
+    assert camera["rotation"] == {"x": 90.0, "y": 0.0, "z": 0.0}
+    assert camera["orthographic"] is True
+    event = above.step("AddThirdPartyCamera", **camera)
+    half, at = camera["orthographicSize"], camera["position"]
+    assert 2 * half == pytest.approx(max(bounds["size"]["x"], bounds["size"]["z"]))
+    checked = 0
+    for entry in event.metadata["objects"]:
+        mask = event.third_party_instance_masks[0].get(entry["objectId"])
+        box = entry["axisAlignedBoundingBox"]
+        if mask is None or entry["objectType"] in ("Floor", "Window") or box["size"]["y"] < 0.05:
+            continue
+        rows, columns = np.nonzero(mask)
+        x = at["x"] + ((columns.min() + columns.max() + 1) / SIZE - 1.0) * half
+        z = at["z"] + (1.0 - (rows.min() + rows.max() + 1) / SIZE) * half
+        if abs(x - box["center"]["x"]) < 0.06 and abs(z - box["center"]["z"]) < 0.06:
+            checked += 1
+    assert checked > 12
+    floor = next(e for e in event.metadata["objects"] if e["objectType"] == "Floor")
+    seen = event.third_party_instance_masks[0][floor["objectId"]]
+    depth = event.third_party_depth_frames[0]
+    assert np.median(depth[seen]) == pytest.approx(at["y"], abs=0.02)  # equally deep everywhere
+    assert np.ptp(depth[seen]) < 0.05
+    stool = next(e for e in event.metadata["objects"] if e["objectType"] == "CounterTop")
+    assert depth[event.third_party_instance_masks[0][stool["objectId"]]].max() < at["y"] - 0.5
+
+
+def test_the_agents_picture_is_a_map_until_it_is_toggled_back(above):
+    before = above.step("Pass")
+    camera = above.step("GetMapViewCameraProperties").metadata["actionReturn"]
+    above.step("AddThirdPartyCamera", **camera)
+    event = above.step("ToggleMapView")
+    assert (event.frame == event.third_party_camera_frames[0][..., :3]).all()
+    assert (event.frame != before.frame).mean() > 0.5
+    assert event.metadata["cameraOrthSize"] == camera["orthographicSize"]
+    visible = [e["objectId"] for e in event.metadata["objects"] if e["visible"]]
+    assert visible == [e["objectId"] for e in before.metadata["objects"] if e["visible"]]
+    assert (above.step("RotateRight").frame == event.frame).all()
+    above.step("RotateLeft")
+    event = above.step("ToggleMapView")
+    assert (event.frame == before.frame).all()
+    assert event.metadata["cameraOrthSize"] == 0.0
+    above.step("ToggleMapView")
+    assert (above.reset("FloorPlan1").frame == before.frame).all()
+
+
+def test_an_orthographic_camera_is_updated_and_becomes_a_pinhole_again(above):
+    camera = above.step("GetMapViewCameraProperties").metadata["actionReturn"]
+    whole = above.step("AddThirdPartyCamera", **camera).third_party_camera_frames[0]
+    half = camera["orthographicSize"] / 2
+    event = above.step("UpdateThirdPartyCamera", orthographicSize=half)
+    near = event.third_party_camera_frames[0]
+    middle = slice(SIZE // 4, 3 * SIZE // 4)
+    assert np.abs(near[::2, ::2].astype(int) - whole[middle, middle]).mean() < 20
+    event = above.step("UpdateThirdPartyCamera", position={"x": 0.3})
+    assert (event.third_party_camera_frames[0] != near).any()
+    refused = above.step("UpdateThirdPartyCamera", orthographic=False, orthographicSize=1)
+    assert "orthographic=True" in refused.metadata["errorMessage"]
+    event = above.step("UpdateThirdPartyCamera", orthographic=False)
+    pinhole = above.step("AddThirdPartyCamera", position={**camera["position"], "x": 0.3},
+                         rotation=camera["rotation"])  # fmt: skip
+    first, second = pinhole.third_party_camera_frames
+    assert (first == second).all()
 
 
 # -- pictures for one step -------------------------------------------------------------------------

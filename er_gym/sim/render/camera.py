@@ -1,4 +1,4 @@
-"""A pinhole camera in AI2-THOR's frame: x right, y up, z forward, left-handed; metres, degrees."""
+"""A camera in AI2-THOR's frame: x right, y up, z forward, left-handed; metres, degrees."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ class Camera:
         fov: the vertical field of view, above 0 and below 180.
         width, height: of the picture, pixels.
         roll: about the view axis, Unity's angle about z.
+        orthographic_size: half of what an orthographic camera sees from bottom to top, metres; None
+            for a pinhole camera. Pixels and rays are those of a pinhole camera.
     """
 
     position: Sequence[float] | NDArray[np.float64]
@@ -31,6 +33,7 @@ class Camera:
     width: int
     height: int
     roll: float = 0.0
+    orthographic_size: float | None = None
 
     @property
     def axes(self) -> NDArray[np.float64]:

@@ -160,14 +160,15 @@ class Rasteriser:
             )
         self._buffer.setClearColorActive(True)
         self._buffer.setClearColor(p3d.LColor(0.0, 0.0, 0.0, 0.0))
-        self._lens = p3d.PerspectiveLens()
-        self._lens.setNearFar(NEAR, FAR)
-        self._camera = p3d.NodePath(p3d.Camera("camera", self._lens))
+        self._pinhole, self._orthographic = p3d.PerspectiveLens(), p3d.OrthographicLens()
+        for lens in (self._pinhole, self._orthographic):
+            lens.setNearFar(NEAR, FAR)
+        self._camera = p3d.NodePath(p3d.Camera("camera", self._pinhole))
         self._room = self._buffer.makeDisplayRegion()
         self._room.setCamera(self._camera)
         # Shadows have a pass of their own, since they write depths: the software rasteriser draws
         # the pixels on the edge between two triangles with both, and would darken them twice.
-        self._veils = p3d.NodePath(p3d.Camera("veils", self._lens))
+        self._veils = p3d.NodePath(p3d.Camera("veils", self._pinhole))
         self._over = self._buffer.makeDisplayRegion()
         self._over.setSort(1)
         self._over.setCamera(self._veils)
@@ -194,9 +195,7 @@ class Rasteriser:
                 self._size = (0, 0)  # the size is unknown if the next line is interrupted
                 self._buffer.setSize(width, height)
                 self._size = (width, height)
-            fov = max(camera.fov, SMALLEST_FOV)
-            half = tan(radians(fov) / 2)
-            self._lens.setFov(2 * degrees(atan(half * width / height)), fov)
+            lens = self._set_lens(camera)
             x, y, z = (float(value) for value in camera.position)
             # Not a node of the graph: moving it there would compute the graph's bounds again.
             self._camera.node().setScene(root)
@@ -205,13 +204,13 @@ class Rasteriser:
             measured = None
             self._show_depth.setValue(depth)
             if self._steps is not None:
-                shift, film = _GPU_SHIFT, self._lens.getFilmSize()
-                self._lens.setFilmOffset(shift * film[0] / width, -shift * film[1] / height)
+                shift, film = _GPU_SHIFT, lens.getFilmSize()
+                lens.setFilmOffset(shift * film[0] / width, -shift * film[1] / height)
             if depth:
                 if self._steps is not None:
                     self._buffer.triggerCopy()
                 self._engine.renderFrame()
-                measured = self._depth(width, height)
+                measured = self._depth(width, height, lens is self._orthographic)
                 self._show_depth.setValue(False)
             if veils is not None:
                 self._veils.node().setScene(veils)
@@ -227,7 +226,22 @@ class Rasteriser:
             seen = pixels[..., 3].copy() if ids else _NO_IDS
             return Frames(rgb, seen, measured)
 
-    def _depth(self, width: int, height: int) -> NDArray[np.float32]:
+    def _set_lens(self, camera: Camera) -> Any:
+        """Give both passes the lens of a camera."""
+        aspect, size = camera.width / camera.height, camera.orthographic_size
+        lens = self._pinhole if size is None else self._orthographic
+        if size is None:
+            fov = max(camera.fov, SMALLEST_FOV)
+            half = tan(radians(fov) / 2)
+            lens.setFov(2 * degrees(atan(half * aspect)), fov)
+        else:
+            lens.setFilmSize(2 * size * aspect, 2 * size)
+        for path in (self._camera, self._veils):
+            if path.node().getLens() != lens:
+                path.node().setLens(lens)
+        return lens
+
+    def _depth(self, width: int, height: int, orthographic: bool) -> NDArray[np.float32]:
         if self._steps is None:  # 0 is far, 2**20 is near
             raw = np.frombuffer(self._buffer.getScreenshot().getRamImage(), np.uint32)
             found = raw.astype(np.float32)
@@ -235,8 +249,11 @@ class Rasteriser:
         else:  # 0 is near, 1 is far
             found = 1.0 - np.frombuffer(self._steps.getRamImage(), np.float32)
             found *= np.float32(FAR - NEAR)
-        found += np.float32(NEAR)
-        np.divide(np.float32(NEAR * FAR), found, out=found)
+        if orthographic:  # their steps are equal, those of a pinhole camera finer nearby
+            np.subtract(np.float32(FAR), found, out=found)
+        else:
+            found += np.float32(NEAR)
+            np.divide(np.float32(NEAR * FAR), found, out=found)
         return np.asarray(found.reshape(height, width)[::-1], dtype=np.float32)
 
 

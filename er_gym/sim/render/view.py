@@ -13,6 +13,7 @@ from er_gym.sim.agent import Agent
 from er_gym.sim.metadata import instance_color
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.settings import Settings, ThirdPartyCamera
+from er_gym.sim.space.map_camera import map_camera
 from er_gym.sim.world import World
 from er_gym.sim.world_cache import CacheKey
 
@@ -53,12 +54,13 @@ class _Kept:
     agent: Agent
     settings: Settings
     cameras: tuple[ThirdPartyCamera, ...]
+    map_view: bool
     view: View
 
     def shows(self, world: World) -> bool:
         # A moving agent is replaced as a whole, and the held object moves only with it.
         same = self.agent is world.agent and self.settings == world.settings
-        return same and self.cameras == world.cameras
+        return same and self.cameras == world.cameras and self.map_view == world.map_view
 
 
 _VIEW: CacheKey[_Kept] = CacheKey("view")
@@ -83,7 +85,9 @@ def draw(world: World) -> View:
         return kept.view
     first, *others = (_draw(world, camera) for camera in _cameras(world))
     view = replace(first, third_party=tuple(others))
-    world.cache.state.put(_VIEW, _Kept(world.agent, world.settings, world.cameras, view))
+    world.cache.state.put(
+        _VIEW, _Kept(world.agent, world.settings, world.cameras, world.map_view, view)
+    )
     return view
 
 
@@ -104,10 +108,25 @@ def object_at(world: World, x: float, y: float) -> str | None:
 def _cameras(world: World) -> Iterator[Camera]:
     settings, agent = world.settings, world.agent
     size = settings.width, settings.height
-    yield Camera(agent.camera, agent.rotation, agent.horizon, settings.field_of_view, *size)
+    if world.map_view:
+        yield _camera(map_camera(world.scene.name), size)
+    else:
+        yield Camera(agent.camera, agent.rotation, agent.horizon, settings.field_of_view, *size)
     for camera in world.cameras:
-        pitch, yaw, roll = camera.rotation
-        yield Camera(camera.position, yaw, pitch, camera.field_of_view, *size, roll=roll)
+        yield _camera(camera, size)
+
+
+def _camera(camera: ThirdPartyCamera, size: tuple[int, int]) -> Camera:
+    pitch, yaw, roll = camera.rotation
+    return Camera(
+        camera.position,
+        yaw,
+        pitch,
+        camera.field_of_view,
+        *size,
+        roll=roll,
+        orthographic_size=camera.orthographic_size,
+    )
 
 
 def _draw(world: World, camera: Camera) -> View:
