@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+from multiprocessing import forkserver
 from multiprocessing.context import ForkServerContext, ForkServerProcess
 from typing import Any
 
@@ -21,7 +22,10 @@ _MODULES_OF_PHASES = (*_MODULES, "agents.finetune.train", "agents.vlm.clients.lo
 
 
 class _Process(ForkServerProcess):
-    """A process with the environment variables of its starter, as a spawned one has them."""
+    """A process with the environment variables of its starter, as a spawned one has them.
+
+    Its own workers fork from the same server.
+    """
 
     def __init__(self, *args: Any, **named: Any) -> None:
         super().__init__(*args, **named)
@@ -30,6 +34,9 @@ class _Process(ForkServerProcess):
     def run(self) -> None:
         os.environ.clear()
         os.environ.update(self._variables)
+        processes.CONTEXT = FORKED  # type: ignore[assignment]
+        # Python means to use the server that a process was forked from, and starts another.
+        forkserver._forkserver.ensure_running = lambda: None  # type: ignore[attr-defined]
         super().run()
 
 

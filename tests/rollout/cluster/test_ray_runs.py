@@ -82,7 +82,7 @@ def test_an_agent_of_the_users_own_travels(nodes, tmp_path):
 
 
 def test_a_collection_is_the_same_and_is_verified_where_its_files_are(nodes, tmp_path):
-    collect = ("collect", "--suite", "train", "--recipe", "balanced", "--parts", "imitation")
+    collect = ("collect", "--suite", "mini", "--recipe", "balanced", "--parts", "imitation")
     collect += ("--types", "single_pickup", "--limit", "2", "--width", "64", "--height", "64")
     er_gym(*collect, "--out", tmp_path / "here")
     er_gym(*collect, "--out", tmp_path / "there", nodes=nodes)
