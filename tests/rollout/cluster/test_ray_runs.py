@@ -88,7 +88,7 @@ def test_a_collection_is_the_same_and_is_verified_where_its_files_are(nodes, tmp
     er_gym(*collect, "--out", tmp_path / "there", nodes=nodes)
     files = ["trajectories.jsonl", "collection.json"]
     files += [str(each.relative_to(tmp_path / "here")) for each in tmp_path.glob("here/**/*.jpeg")]
-    assert len(files) > 10
+    assert len(files) > 6
     for name in files:
         assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
     verify = ("data", "verify", tmp_path / "there")
