@@ -14,12 +14,11 @@ from agents.expert.thought_kinds import load_thought_kinds
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.records import EpisodeRecord
-from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import Task
 
 SUITE = load_suite("mini")
-TASKS = resolve_tasks(SUITE.tasks).tasks
+TASKS = SUITE.tasks
 KINDS = load_thought_kinds()
 SEED = 7
 MOST = 40

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections import defaultdict
 from collections.abc import Container, Iterator
 from graphlib import CycleError, TopologicalSorter
@@ -129,7 +130,10 @@ def imports_of(path: Path) -> list[tuple[int, str]]:
     return [*imported_modules(path.read_text(encoding="utf-8"), package)]
 
 
-IMPORTS = {path: imports_of(path) for path in SOURCES}
+@functools.cache
+def all_imports() -> dict[Path, list[tuple[int, str]]]:
+    """Found when a test asks, not in every process that collects the tests."""
+    return {path: imports_of(path) for path in SOURCES}
 
 
 @in_one_test("path", SOURCES)
@@ -138,7 +142,7 @@ def test_imports_only_from_layers_below(path: Path) -> None:
     assert mine is not None
     wrong = [
         f"line {line}: {mine} may not import {imported}"
-        for line, imported in IMPORTS[path]
+        for line, imported in all_imports()[path]
         if (theirs := layer(imported)) is not None and theirs not in ALLOWED[mine]
     ]
     assert not wrong
@@ -158,7 +162,7 @@ def imported_by_module() -> dict[str, set[str]]:
     return {
         (name := module_name(path)): {
             module
-            for _, imported in IMPORTS[path]
+            for _, imported in all_imports()[path]
             if (module := known_module(imported, names)) not in (None, name)
         }
         for path in SOURCES

@@ -35,6 +35,21 @@ def model_directory(path: str) -> str:
     return str(run / MODEL)
 
 
+def named_model(path: str) -> str:
+    """The directory of a model as :func:`model_directory` has it, or the model's name on a hub.
+
+    Raises:
+        ValueError: the run is not finished, or the path is no name and no directory.
+    """
+    path = model_directory(path)
+    if not Path(path).is_dir() and (path.startswith(("/", ".", "~")) or path.count("/") > 1):
+        raise ValueError(
+            f"there is no directory {path}; give one with a model in it, or a model's name on the "
+            "Hugging Face hub"
+        )
+    return path
+
+
 def agent_file(path: str) -> Path | None:
     """The file with the settings that a model was tuned for; None if its directory has none.
 

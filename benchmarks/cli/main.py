@@ -51,6 +51,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
     use_any_encoding()
     # At its end Python looks through all objects for cycles, in seconds where torch is loaded.
     atexit.register(gc.freeze)
+    atexit.register(_end_by_exit_code)
     try:
         with interrupted_by_sigterm(), showing_activity():
             code = cli.main(args=args, prog_name="er-gym", standalone_mode=False)
@@ -78,6 +79,16 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
         print_problem(f"there is not enough memory: {error}".rstrip(": "))
         sys.exit(1)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _end_by_exit_code() -> None:
+    """Let ``python -m`` end with the exit code of :func:`main`, also after Ctrl-C.
+
+    Python remembers a Ctrl-C that ended text given to ``exec``, of which a dataclass is made, even
+    if it was caught outside; a program begun by ``-m`` then ends by SIGINT. The next such text
+    makes Python forget it.
+    """
+    exec("")
 
 
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})

@@ -90,11 +90,16 @@ def chosen_tasks(suite: Suite, types: Sequence[str], scenes: Sequence[str]) -> S
 def fitted_tasks(suite: Suite, backend: str = "embedded") -> ResolvedTasks:
     """The suite's tasks with the ids of their scenes; set aside are the faulty ones, too.
 
+    Those that come with er-gym fit the embedded engine as they are, so no room is looked at.
+
     Raises:
         BadInput: all are set aside.
     """
-    from er_gym.tasks.resolve import resolve_tasks
+    from er_gym.tasks.resolve import ResolvedTasks, resolve_tasks
+    from er_gym.tasks.suites import comes_with_er_gym
 
+    if backend == "embedded" and comes_with_er_gym(suite):
+        return ResolvedTasks(suite.tasks)
     fitted = resolve_tasks(suite.tasks, backend)
     set_aside = (*suite.set_aside, *fitted.set_aside)
     refuse_if_none(fitted.tasks, set_aside, f"{suite.name}: no task can be played")

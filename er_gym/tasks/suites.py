@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -129,7 +129,23 @@ def own_tasks(name: str) -> tuple[Task, ...]:
             f"the suite {name!r} does not come with er-gym and is not in {file.parent} yet; "
             f"run: er-gym tasks generate --suite {name}"
         )
+    return _read_own(file, file.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=4)
+def _read_own(file: Path, changed: int) -> tuple[Task, ...]:
     return tuple(jsonl_format.read_tasks(file))
+
+
+def comes_with_er_gym(suite: Suite) -> bool:
+    """Whether each task of a suite is one of a suite that comes with er-gym, unchanged.
+
+    The embedded engine has every object of such tasks: each was played before it was kept.
+    """
+    if suite.name not in suite_names() or suite_file(suite.name).parent != _DATA:
+        return False
+    own = {id(task) for task in own_tasks(suite.name)}
+    return all(id(task) in own for task in suite.tasks)
 
 
 def _own_suite(name: str) -> Suite:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,6 +10,7 @@ from typing import Any
 import pytest
 import yaml
 from click.testing import CliRunner
+from forked import start_er_gym
 
 from agents.finetune.samples import drawn
 from agents.finetune.settings import load_settings
@@ -30,7 +29,7 @@ SMALL: dict[str, Any] = {
     "suite": "mini",
     "workers": 1,
     "pictures": False,
-    "play": ["sampling.max_tokens=30"],
+    "play": ["sampling.max_tokens=8"],
     "finetune": "tiny",
     "collections": {"expert": {"collect": {"parts": ["imitation"], "limit": 2}}},
     "rows": {
@@ -63,17 +62,10 @@ def test_the_phases_are_commands_that_exist(name: str, tmp_path: Path) -> None:
 def test_a_small_ablation_is_run_and_told(tmp_path: Path) -> None:
     file, root = tmp_path / "small.yaml", tmp_path / "out"
     file.write_text(yaml.safe_dump(SMALL), encoding="utf-8")
-    command = [
-        sys.executable,
-        "-m",
-        "tests.forked",
-        "ablate",
-        "--config",
-        str(file),
-        "--out",
-        str(root),
-    ]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    said = tmp_path / "said"
+    process = start_er_gym(["ablate", "--config", str(file), "--out", str(root)], said)
+    process.join()
+    assert process.exitcode == 0, said.read_text()
     first, second = json.loads((root / "result.json").read_text())["studies"]["both"]
     assert (first["name"], first["n"], first["difference"]) == ("once", 1, None)
     assert second["difference"]["mean"] == second["success"]["mean"] - first["success"]["mean"]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import os
+import subprocess
 import sys
 
 import pytest
@@ -181,6 +183,21 @@ def test_ctrl_c_leaves_one_line(tmp_path):
     assert done.code == 130
     assert done.text().rstrip().endswith("er-gym: interrupted")
     assert "Traceback" not in done.text()
+
+
+INTERRUPTED = """
+from benchmarks.cli.main import cli, main
+cli.commands["suites"].callback = lambda: exec("raise KeyboardInterrupt")
+main(["suites"])
+"""
+
+
+def test_ctrl_c_ends_with_its_exit_code_also_while_a_dataclass_is_made(tmp_path):
+    (tmp_path / "stopped.py").write_text(INTERRUPTED, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}"}
+    command = [sys.executable, "-m", "stopped"]
+    ended = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr.strip()) == (130, "er-gym: interrupted")
 
 
 @pytest.mark.parametrize("terminal", [True, False])

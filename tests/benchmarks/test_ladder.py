@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
 import sys
 import time
 from dataclasses import replace
@@ -17,6 +14,7 @@ import click
 import pytest
 import yaml
 from click.testing import CliRunner
+from forked import start_er_gym
 
 from agents.finetune.settings import load_settings
 from benchmarks.cli.main import cli, main
@@ -35,7 +33,7 @@ SMALL: dict[str, Any] = {
     "suite": "mini",
     "workers": 1,
     "pictures": False,
-    "play": ["sampling.max_tokens=60"],
+    "play": ["sampling.max_tokens=8"],
     "stages": {
         "imitation": {
             "teacher": {"agent": "searcher", "tasks": 2},
@@ -326,20 +324,20 @@ def test_a_first_model_must_be_there(tmp_path: Path) -> None:
 def test_a_ladder_is_climbed_though_it_is_killed_twice(tmp_path: Path) -> None:
     file, root = tmp_path / "ladder.yaml", tmp_path / "ladder"
     file.write_text(yaml.safe_dump(SMALL), encoding="utf-8")
-    command = [sys.executable, "-m", "tests.forked", "ladder"]
-    command += ["--config", str(file), "--out", str(root)]
+    command, said = ["ladder", "--config", str(file), "--out", str(root)], tmp_path / "said"
     killed_in = []
     for phase in ("1-imitation", "evaluations/3-reflection"):
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        process = start_er_gym(command, said)
         while not (root / phase).exists():
-            assert process.poll() is None, "it ended before it could be killed"
+            assert process.exitcode is None, "it ended before it could be killed"
             time.sleep(0.05)
-        os.kill(process.pid, signal.SIGKILL)
-        process.wait()
+        process.kill()
+        process.join()
         killed_in.append(len(done(root)))
     assert killed_in == sorted(set(killed_in))
-    finished = subprocess.run(command, capture_output=True, text=True)
-    assert finished.returncode == 0, finished.stderr
+    process = start_er_gym(command, said)
+    process.join()
+    assert process.exitcode == 0, said.read_text()
     settings = LADDER.load(str(file))
     assert done(root) == [phase.name for phase in Study(LADDER, root, settings).plan.phases]
     figures = json.loads((root / "result.json").read_text())

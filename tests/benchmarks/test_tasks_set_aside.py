@@ -15,8 +15,10 @@ from typing import Any
 import pytest
 from support import with_ids
 
+from benchmarks.cli.suites import fitted_tasks
 from er_gym.tasks import Task, load_suite, suite_from_file
 from er_gym.tasks.jsonl_format import write_tasks
+from er_gym.tasks.resolve import ResolvedTasks
 
 Command = Callable[..., tuple[int, str, str]]
 
@@ -149,3 +151,18 @@ def test_bench_plays_what_can_be_played_and_says_so_everywhere(
     assert (code, err.count("\n")) == (2, 1)
     assert "no object 'Egg" in err
     assert er_gym(*command, "--task-ids", f"ghost,{taken['task_id']}")[0] == 0
+
+
+def test_what_comes_with_er_gym_is_played_without_a_look_at_its_rooms(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def look(tasks: object, backend: str) -> ResolvedTasks:
+        raise LookupError(backend)
+
+    monkeypatch.setattr("er_gym.tasks.resolve.resolve_tasks", look)
+    suite = load_suite("mini")
+    assert fitted_tasks(suite) == ResolvedTasks(suite.tasks)
+    with pytest.raises(LookupError, match="unity"):
+        fitted_tasks(suite, "unity")
+    with pytest.raises(LookupError, match="embedded"):
+        fitted_tasks(replace(suite, tasks=(replace(suite.tasks[0], instruction="?"),)))

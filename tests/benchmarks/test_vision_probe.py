@@ -65,8 +65,8 @@ def test_a_model_is_measured_from_nothing_to_the_table(tmp_path: Path) -> None:
     frames, base, tuned = (tmp_path / each for each in ("frames", "base", "tuned"))
     run("data", "frames", "--suite", "mini", "--scenes", "FloorPlan402", "--frames", "6", "--out",
         frames, "--width", "96", "--height", "54", "--workers", "1")  # fmt: skip
-    run("new-model", "tiny-vl", "--set", "vocabulary=400", "--data", frames, "--dialect", "sight",
-        "--out", base)  # fmt: skip
+    run("new-model", "tiny-vl", "--set", "vocabulary=400", "--set", "text.num_hidden_layers=1",
+        "--data", frames, "--dialect", "sight", "--out", base)  # fmt: skip
     run("finetune", "--config", "tiny", "--model", base, "--data", frames, "--out", tuned,
         "--set", "data.dialect=sight", "--set", "training.epochs=1")  # fmt: skip
     result = CliRunner().invoke(main, [str(tuned), str(frames), "--limit", "3", "--md"])

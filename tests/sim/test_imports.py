@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -39,20 +40,23 @@ def imports(source: str) -> Iterator[str]:
                 yield name.removeprefix("er_gym.sim.")
 
 
-GRAPH = {
-    module: set(imports(path.read_text(encoding="utf-8"))) - {module}
-    for module, path in SOURCES.items()
-}
+@functools.cache
+def graph() -> dict[str, set[str]]:
+    """Each module to those that it imports: found when a test asks, not by every process."""
+    return {
+        module: set(imports(path.read_text(encoding="utf-8"))) - {module}
+        for module, path in SOURCES.items()
+    }
 
 
 def test_no_module_imports_itself_through_others() -> None:
-    assert len(list(TopologicalSorter(GRAPH).static_order())) >= len(SOURCES)
+    assert len(list(TopologicalSorter(graph()).static_order())) >= len(SOURCES)
 
 
 def test_no_folder_imports_itself_through_others() -> None:
     """Each folder counts as a whole: geometry, renderer and actions stand above one another."""
     folders: dict[str, set[str]] = {}
-    for module, imported in GRAPH.items():
+    for module, imported in graph().items():
         folder = module.partition(".")[0]
         others = {name.partition(".")[0] for name in imported} - {folder}
         folders.setdefault(folder, set()).update(others)

@@ -11,11 +11,12 @@ from typing import Any
 import pytest
 from support import in_one_test, make_task, with_ids
 
-from er_gym.tasks import AgentPose, Task, TaskFileError, load_suite
+from er_gym.tasks import AgentPose, Task, TaskFileError, jsonl_format, load_suite, suite_from_file
 from er_gym.tasks.arrangement import Arrangement, ObjectPose
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.paper_format import read_tasks
-from er_gym.tasks.resolve import NEAR, resolve_task, resolve_tasks
+from er_gym.tasks.resolve import NEAR, ResolvedTasks, resolve_task, resolve_tasks
+from er_gym.tasks.suites import comes_with_er_gym
 from er_gym.tasks.task import KeyAction
 from er_gym.tasks.types import task_type
 
@@ -216,6 +217,24 @@ def test_the_paper_tasks_fit_their_scenes(shared_data) -> None:
     assert sum("states no type" in note for note in fitted.notes) == 4
     assert len(fitted.notes) == 10
     assert fitted.substitutions == fitted.set_aside == ()
+
+
+@pytest.mark.parametrize(("name", "every"), [("mini", 3), ("er-1k", 20), ("train", 200)])
+def test_what_comes_with_er_gym_fits_as_it_is(name: str, every: int) -> None:
+    suite = load_suite(name)
+    some = replace(suite, tasks=suite.tasks[::every])
+    assert comes_with_er_gym(some)
+    assert resolve_tasks(some.tasks) == ResolvedTasks(some.tasks)
+
+
+def test_a_changed_task_and_a_file_of_the_same_name_do_not_come_with_er_gym(tmp_path) -> None:
+    suite = load_suite("mini")
+    first, *others = suite.tasks
+    assert comes_with_er_gym(suite)
+    assert not comes_with_er_gym(replace(suite, tasks=(replace(first, instruction="?"), *others)))
+    assert not comes_with_er_gym(replace(suite, name="another"))
+    jsonl_format.write_tasks(tmp_path / "mini.jsonl", suite.tasks)
+    assert not comes_with_er_gym(suite_from_file(tmp_path / "mini.jsonl"))
 
 
 def shifted(task: Task, metres: float, rng: random.Random) -> Task:

@@ -15,7 +15,7 @@ from transformers.processing_utils import ProcessorMixin
 
 from agents.vlm.clients.adapters import ADAPTER, adapter_chain, with_adapter
 from agents.vlm.settings import AgentSettings
-from agents.vlm.tuned_model import model_directory
+from agents.vlm.tuned_model import named_model
 from er_gym.activity import begin
 from er_gym.extras import MissingPackage
 
@@ -56,15 +56,10 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
     Raises:
         ValueError: the model or adapter does not exist, is broken, or does not fit the settings.
     """
-    path = model_directory(path)
+    path = named_model(path)
     begin(f"loading the weights of {path}")
     local, sees = settings.local, settings.sees == "pictures"
     is_here = Path(path).is_dir()
-    if not is_here and (path.startswith(("/", ".", "~")) or path.count("/") > 1):
-        raise ValueError(
-            f"there is no directory {path}; give one with a model in it, or a model's name on the "
-            "Hugging Face hub"
-        )
     where = {"local_files_only": is_here}
     whole, adapters = adapter_chain(Path(path)) if is_here else (Path(path), ())
     base = str(whole) if is_here else path

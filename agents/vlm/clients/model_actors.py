@@ -14,6 +14,7 @@ from ray.exceptions import RayError, RayTaskError
 from agents.vlm.chat import Message, ModelError, Reply
 from agents.vlm.clients.supervisor import AGAIN, RequestSupervisor
 from agents.vlm.settings import AgentSettings
+from agents.vlm.tuned_model import named_model
 from er_gym.rollout.agent import CannotGoOn
 from er_gym.rollout.cluster.actors import start_actor
 
@@ -111,6 +112,7 @@ class ModelActor:
     """A copy of the model, in an actor. Its methods run in several threads at once."""
 
     def __init__(self, path: str, settings: AgentSettings) -> None:
+        named_model(path)  # before the seconds in which torch is imported
         from agents.vlm.clients.local import LocalClient
 
         self._client = LocalClient(path, settings)

@@ -21,7 +21,7 @@ from er_gym.rollout.events import Cost
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.rollout.selection import select
 from er_gym.tasks.resolve import ResolvedTasks, resolve_tasks
-from er_gym.tasks.suites import Suite, load_suite, suite_names
+from er_gym.tasks.suites import Suite, comes_with_er_gym, load_suite, suite_names
 from er_gym.tasks.task import Task
 from er_gym.writing import file_stem
 
@@ -78,6 +78,8 @@ def playable(suite: str) -> tuple[Suite, ResolvedTasks]:
     if suite not in suite_names():  # another name could be a module, which would be run
         raise ValueError(f"there is no suite {suite!r:.80}; choose: {', '.join(suite_names())}")
     found = load_suite(suite)
+    if comes_with_er_gym(found):
+        return found, ResolvedTasks(found.tasks)
     return found, resolve_tasks(found.tasks, _BACKEND, arrange=False)
 
 

@@ -34,6 +34,9 @@ LOCAL_ENVIRONMENT = {
     # Ray's name for it: without clusters, every server listens on loopback alone.
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
     "RAY_USAGE_STATS_ENABLED": "0",
+    # A worker is started when it is asked for; Ray would start one per processor beforehand.
+    "RAY_enable_worker_prestart": "0",
+    "RAY_prestart_worker_first_driver": "0",
 }
 _JOIN_ENVIRONMENT = {"RAY_BACKEND_LOG_LEVEL": "error"}
 """Without lines of Ray's own beside er-gym's, which says the same."""

@@ -35,7 +35,7 @@ def test_a_tiny_model_with_vision_plays_what_it_has_learnt_by_heart(
     er_gym("new-model", "tiny-vl", "--set", "vocabulary=500", "--data", data, "--dialect", dialect,
            "--out", base)  # fmt: skip
     er_gym("finetune", "--config", "tiny", "--model", base, "--data", data, "--out", run,
-           "--set", f"data.dialect={dialect}", "--set", "training.epochs=150",
+           "--set", f"data.dialect={dialect}", "--set", "training.epochs=100",
            "--set", "training.batch=2", "--set", "training.learning_rate=0.002")  # fmt: skip
     tasks = ",".join(sorted({each.task_id for each in Collection.open(data).trajectories()}))
     er_gym("bench", "--suite", NAME, "--task-ids", tasks, "--agent", f"hf:{run}",
