@@ -1,7 +1,8 @@
 """Ways to poison a collection that is to be trained on.
 
-Each tampering changes one trajectory of a collection, or its files, so that something else is learnt
-from it, and leaves it as plausible as it can. It changes the part's own copy of the trajectory, too.
+Each tampering changes one trajectory of a collection, or its files, so that something else is
+learnt from it, and leaves it as plausible as it can. It changes the part's own record of the
+trajectory, too.
 """
 
 from __future__ import annotations
@@ -118,8 +119,7 @@ def _thought(fits: Fits, **fields: Any) -> Tampering:
 
     def change(loot: Loot) -> Json:
         one, turn = loot.turn(lambda turn: turn["thoughts"] and fits(turn))
-        for name, value in fields.items():
-            turn["thoughts"][0][name] = value(turn["thoughts"][0][name]) if callable(value) else value
+        turn["thoughts"][0].update(fields)
         return one
 
     return change
@@ -258,7 +258,7 @@ TAMPERINGS: dict[str, Tampering] = {
     "another task type": _set(task_type="pickup_and_put"),
     "another name": _set(name=lambda name: name + " now"),
     "other search targets": _set(search_targets=lambda _: ["Safe"]),
-    "another room": _set(scene=lambda scene: "FloorPlan1" if scene != "FloorPlan1" else "FloorPlan2"),
+    "another room": _set(scene="FloorPlan230"),
     "another step limit": _set(max_steps=lambda steps: steps + 5),
     "another task with all that belongs to it": _says_that_the_task_was_another,
     "another seed": _set(seed=lambda seed: seed + 1),
