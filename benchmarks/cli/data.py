@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from er_gym.data.collection import Collection
+    from er_gym.data.reenactment import Reenact
     from er_gym.data.trajectory import Trajectory
     from er_gym.tasks.task import Task
 
@@ -115,6 +116,8 @@ def verify(
         doing(f"counting the trajectories of {collection}")
         number = sum(1 for _ in islice(lines_of(opened), limit))
         opened.parts()
+        doing("drawing what the collection's seed draws")
+        reenact = reenact_of(opened, tasks)
         if not number:
             raise BadInput(f"{collection} holds no trajectory yet; run er-gym collect again")
     totals, lines = Totals(), 0
@@ -131,6 +134,7 @@ def verify(
                 limit=limit,
                 workers=workforce.workers,
                 worker_backend=workforce.worker_backend,
+                reenact=reenact,
             )
             for verdict in stack.enter_context(closing(verdicts)):
                 totals.add(verdict)
@@ -227,6 +231,26 @@ def _ids(collection: Collection) -> list[str]:
     if not ids:
         raise BadInput(f"{collection.path} holds no trajectory yet; run er-gym collect again")
     return ids
+
+
+def reenact_of(collection: Collection, tasks: Sequence[Task]) -> Reenact:
+    """How the agents of a collection decide.
+
+    Args:
+        collection: the collection.
+        tasks: the suite's.
+    """
+    from benchmarks.reenacting import reenacting
+    from er_gym.data.line_index import lines_of
+    from er_gym.tasks.resolve import resolve_tasks
+
+    settings = collection.manifest.settings
+    types, scenes = settings.get("tasks", ()), settings.get("scenes", ())
+    chosen = [task for task in tasks if task.type.name in types and task.scene in scenes]
+    sizes = {part.manifest.suite_size for part in collection.parts().values()}
+    if sizes != {len(chosen)}:  # some were set aside; to find them takes long
+        chosen = [*resolve_tasks(chosen, settings.get("env", {}).get("backend", "embedded")).tasks]
+    return reenacting(collection.manifest, chosen, [*lines_of(collection)])
 
 
 def _tasks(
