@@ -259,6 +259,8 @@ def _tasks(
     """The tasks of the suite that was played. No module is imported that only the collection names,
     which may be a stranger's."""
     from er_gym.data.sharegpt_import import SOURCE
+    from er_gym.envs.protocol import PAPER
+    from er_gym.tasks.paper_format import with_every_pose
     from er_gym.tasks.suites import load_suite, suite_registry
 
     told = collection.manifest
@@ -282,4 +284,6 @@ def _tasks(
             f"the tasks of {suite.name!r:.100} are not those that {collection.path} was played in; "
             "give the same ones with --tasks-file or --suite, or use the er-gym that collected it"
         )
+    if "selects" in told.settings and told.settings["env"].get("protocol") == PAPER.name:
+        return with_every_pose(suite.tasks)  # as er-gym bench played them
     return suite.tasks

@@ -136,11 +136,18 @@ def verify(
                 yield from verdicts
 
 
-def thought_problems(trajectory: Trajectory) -> Iterator[str]:
+def thought_problems(
+    trajectory: Trajectory, limits: Mapping[str, int] | None = None
+) -> Iterator[str]:
     """The critic's objections to a trajectory's thoughts, one line each.
 
-    If a model decided and thought in one reply, its thoughts are kept as they are. Then it is a
-    problem only if the record lacks an objection of the critic.
+    If a model decided and thought in one reply, its thoughts are kept as they are, and the record
+    has the critic's objections. Then it is a problem only if these are others.
+
+    Args:
+        trajectory: the trajectory.
+        limits: the most words of a model's own thought of each kind; None if nothing tells them.
+            Then the record may have objections that the critic does not have now.
     """
     quotes = trajectory.kind in QUOTING
     for index, turn in enumerate(trajectory.turns):
@@ -152,12 +159,18 @@ def thought_problems(trajectory: Trajectory) -> Iterator[str]:
             instruction=trajectory.instruction,
             language=trajectory.language,
         )
-        for thought in turn.thoughts:
-            known = thought.refused if quotes and thought.writer != "grounded" else ()
-            for refusal in critic.check(thought.text, thought.kind, knowledge, limit=MOST_WORDS):
-                if refusal.code in known:
-                    continue
-                yield f"turn {index}: {thought.kind}: {refusal.code}: {refusal.detail}"
+        for number, thought in enumerate(turn.thoughts):
+            quoted = quotes and thought.writer == trajectory.actor
+            limit = limits[thought.kind] if quoted and limits else MOST_WORDS
+            found = critic.check(thought.text, thought.kind, knowledge, limit=limit)
+            if quoted and limits:
+                codes = [*dict.fromkeys(each.code for each in found)]
+                for line in compared("refused", thought.refused, codes, "the critic"):
+                    yield f"turn {index}: thoughts[{number}].{line}"
+                continue
+            for refusal in found:
+                if not (quoted and refusal.code in thought.refused):
+                    yield f"turn {index}: {thought.kind}: {refusal.code}: {refusal.detail}"
 
 
 def _batches(lines: Sequence[Line], tasks: Iterable[Task]) -> list[_Batch]:
@@ -237,7 +250,8 @@ class _Worker:
         if not self._critic_works:
             return []
         try:
-            return self._caught(lambda: thought_problems(trajectory))
+            limits = self._collection.manifest.settings.get("thoughts", {}).get("limits", {})
+            return self._caught(lambda: thought_problems(trajectory, limits.get("alone")))
         except NotImplementedError:
             self._critic_works = False
             return []
