@@ -18,6 +18,7 @@ from typing import Any, TypeAlias
 from PIL import Image
 
 from er_gym.data.collection import PLAYED, TRAJECTORIES
+from er_gym.rollout.play import episode_seed
 
 Json: TypeAlias = dict[str, Any]
 Fits: TypeAlias = Callable[[Json], object]
@@ -49,13 +50,13 @@ class Loot:
             if fits(turn)
         )
 
-    def write(self, *changed: Json) -> None:
-        """Leave only these trajectories in the collection, in both places."""
+    def write(self, *changed: Json, own: bool = True) -> None:
+        """Leave only these trajectories in the collection, and in the parts' own records."""
         lines = [json.dumps(one, ensure_ascii=False, separators=(",", ":")) for one in changed]
         (self.folder / TRAJECTORIES).write_text("".join(f"{line}\n" for line in lines))
         for one, line in zip(changed, lines, strict=True):
             part = self.folder / "parts" / one["part"]
-            if (part / PLAYED).is_dir():
+            if own and (part / PLAYED).is_dir():
                 (part / PLAYED / f"{one['id']}.json").write_text(line + "\n")
 
 
@@ -340,3 +341,130 @@ TAMPERINGS: dict[str, Tampering] = {
     "no success": _set(success=False),
 }
 """What each tampering does. They were written before the checks that find them."""
+
+
+# -- a second list, written when the checks for the first one were there ---------------------------
+
+
+def _manifests(change: Callable[[Json], object], *, of_parts: bool = True) -> Fits:
+    """Change the settings in the collection's manifest, and in those of its parts."""
+
+    def changed(loot: Loot) -> None:
+        files = [(loot.folder / "collection.json", "settings")]
+        if of_parts:
+            files += [(one, "agent_settings") for one in loot.folder.glob("parts/*/run.json")]
+        for file, name in files:
+            told = json.loads(file.read_text())
+            change({"manifest": told, "settings": told[name]})
+            file.write_text(json.dumps(told))
+
+    return changed  # type: ignore[return-value]
+
+
+def _turns_a_picture(loot: Loot) -> Json:
+    one, turn = loot.turn(lambda turn: turn["pictures"])
+    file = loot.folder / turn["pictures"][0]["path"]
+    exif = Image.Exif()
+    exif[0x0112] = 3  # upside down
+    Image.open(io.BytesIO(file.read_bytes())).save(file, "jpeg", quality=80, exif=exif)
+    return one
+
+
+def _swaps_two_files(loot: Loot) -> Json:
+    one = loot.one()
+    first, second = (loot.folder / turn["pictures"][0]["path"] for turn in one["turns"][:2])
+    held = first.read_bytes()
+    first.write_bytes(second.read_bytes())
+    second.write_bytes(held)
+    return one
+
+
+def _says_another_seed(loot: Loot) -> Json:
+    _manifests(lambda told: told["manifest"].update(seed=99))(loot)  # type: ignore[arg-type]
+    one = loot.one()
+    one["seed"] = episode_seed(99, one["id"])
+    return one
+
+
+def _says_that_nothing_failed(loot: Loot) -> Json:
+    file = loot.folder / "parts" / "anomalies" / "run.json"
+    told = json.loads(file.read_text())
+    del told["env"]["faults"]
+    file.write_text(json.dumps(told))
+    return loot.one(_is("a"))
+
+
+def _plays_it_once_more(loot: Loot) -> Json:
+    """A copy under another id, as if it had been drawn again, with its seed and pictures."""
+    one = loot.one(_is("explored"))
+    before, one["id"] = one["id"], f"{one['id']}1"
+    one["seed"] = episode_seed(0, one["id"])
+    pictures = loot.folder / "parts" / one["part"] / "pictures"
+    shutil.copytree(pictures / before, pictures / one["id"])
+    for turn in one["turns"]:
+        for picture in turn["pictures"]:
+            picture["path"] = picture["path"].replace(f"/{before}/", f"/{one['id']}/")
+    return one
+
+
+def _thinks_otherwise(loot: Loot, **fields: str) -> Json:
+    """A thought that the critic takes for true."""
+    one = loot.one(_is("explored"))
+    one["turns"][0]["thoughts"][0].update(
+        text="I always go to the first place that comes to my mind.", **fields
+    )
+    return one
+
+
+def _says_an_older_version(loot: Loot) -> Json:
+    _manifests(lambda told: told["manifest"].update(er_gym="0.0.9"))(loot)  # type: ignore[arg-type]
+    return _thinks_otherwise(loot)
+
+
+def _says_another_writer(loot: Loot) -> Json:
+    _manifests(lambda told: told["settings"].update(writer="x:Y"))(loot)  # type: ignore[arg-type]
+    return _thinks_otherwise(loot)
+
+
+def _says_a_model_took_part(loot: Loot) -> Json:
+    expert = {"name": "openai:gpt-4o", "decisions": "plan", "places": "likely", "settings": {}}
+    _manifests(lambda told: told["settings"].update(expert=expert))(loot)  # type: ignore[arg-type]
+    return _thinks_otherwise(loot, writer="openai:gpt-4o")
+
+
+def _thinks_in_another_order(loot: Loot) -> Json:
+    one, turn = loot.turn(lambda turn: len(turn["thoughts"]) > 1)
+    turn["thoughts"].reverse()
+    return one
+
+
+def _removes_the_parts_own_record(loot: Loot) -> Json:
+    one = loot.one()
+    (loot.folder / "parts" / one["part"] / PLAYED / f"{one['id']}.json").unlink()
+    loot.write = lambda *changed: Loot.write(loot, *changed, own=False)  # type: ignore[method-assign]
+    return one
+
+
+def _changes_the_collections_file_alone(loot: Loot) -> Json:
+    loot.write = lambda *changed: Loot.write(loot, *changed, own=False)  # type: ignore[method-assign]
+    return _thinks_otherwise(loot)
+
+
+MORE: dict[str, Tampering] = {
+    "a picture upside down": _turns_a_picture,
+    "the views around listed in another order": _set_turn(
+        lambda turn: turn["views"], views=lambda views: dict(reversed(views.items()))
+    ),
+    "two files of pictures swapped": _swaps_two_files,
+    "another seed of the collection": _says_another_seed,
+    "a part without faults": _says_that_nothing_failed,
+    "an episode once more": _plays_it_once_more,
+    "an older version of er-gym, and another thought": _says_an_older_version,
+    "another package's writer, and another thought": _says_another_writer,
+    "a model that took part, and another thought": _says_a_model_took_part,
+    "thoughts in another order": _thinks_in_another_order,
+    "no record of the part": _removes_the_parts_own_record,
+    "another thought in the collection's file alone": _changes_the_collections_file_alone,
+    "a sign that nobody sees in the instruction": _set(instruction=lambda text: text + "\u200b"),
+}
+"""What each tampering of the second list does."""
