@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
+from pydantic import ValidationError
+
 from agents.expert.candidates import Candidate, CandidateSequence
 from agents.expert.corrections import Beginning
 from agents.expert.course import Course, Intent, View
@@ -26,13 +28,13 @@ from agents.expert.thinker import ThinkingAgent
 from agents.expert.thought_kinds import ThoughtKinds
 from agents.expert.writers.base import ThoughtRequest, ThoughtWriter, WrittenThoughts
 from agents.expert.writers.registry import checked_grounded
-from er_gym.data.collection import CollectionManifest
+from er_gym.data.collection import CollectionError, CollectionManifest
 from er_gym.data.line_index import Line
 from er_gym.data.train_rule import QUOTING
 from er_gym.data.trajectory import Subgoal, ThoughtRecord, Trajectory, Turn
 from er_gym.tasks import verbs
+from er_gym.tasks.errors import first_problem
 from er_gym.tasks.task import Task
-from er_gym.version import __version__
 
 GROUNDED = "grounded"
 _HEADER = ("kind", "mode", "actor", "correction")
@@ -74,8 +76,8 @@ class Reenacting:
         header = {name: getattr(header_of(candidate, told.play), name) for name in _HEADER}
         if told.selects:
             del header["actor"]  # the run's agent
-        writes = told.writes(trajectory)
-        witness = Witness(trajectory.turns, checked_grounded() if writes else None)
+        writer = checked_grounded() if told.writes(trajectory) else None
+        witness = Witness(trajectory.turns, writer)
         agent = ThinkingAgent(
             _course(candidate, trajectory, told),
             header_of(candidate, told.play),
@@ -85,6 +87,11 @@ class Reenacting:
             trajectory.seed,
         )
         return Reenacted(header, task, agent, witness, told.attempt(candidate, trajectory))
+
+    def writes(self, manifest: CollectionManifest, trajectory: Trajectory) -> bool:
+        """See :class:`er_gym.data.reenactment.Reenact`."""
+        told = _told(manifest)
+        return told is not None and told.writes(trajectory)
 
 
 def reenacting(
@@ -164,11 +171,13 @@ class Told:
         return any(mine & {*kinds} for kinds in others)
 
     def writes(self, trajectory: Trajectory) -> bool:
-        """Whether er-gym's own writer wrote the thoughts."""
-        alone = self.settings["writer"] == GROUNDED and "expert" not in self.settings
+        """Whether er-gym's own writer wrote the thoughts, and no model before it."""
+        if "expert" in self.settings:
+            return False
         thoughts = [each for turn in trajectory.turns for each in turn.thoughts]
-        quotes = trajectory.kind in QUOTING and any(each.writer != GROUNDED for each in thoughts)
-        return alone and not quotes
+        if trajectory.kind not in QUOTING and self.settings["writer"] == GROUNDED:
+            return True
+        return all(each.writer == GROUNDED for each in thoughts)
 
     def candidate(self, task: Task, trajectory: Trajectory, drawn: Drawn) -> Candidate:
         """The candidate that a trajectory is said to be."""
@@ -216,18 +225,27 @@ class Told:
 
 @lru_cache(maxsize=1)
 def _settings_of(stated: str) -> Told:
-    settings = CollectionManifest.model_validate_json(stated).settings
-    kinds = ThoughtKinds.model_validate(settings["thoughts"])
-    play = PlaySettings(kinds, None, settings["language"])
-    return Told(settings, Recipe.model_validate(settings["recipe"]), play)
+    manifest = CollectionManifest.model_validate_json(stated)
+    settings = manifest.settings
+    try:
+        kinds = ThoughtKinds.model_validate(settings["thoughts"])
+        play = PlaySettings(kinds, None, settings["language"])
+        return Told(settings, Recipe.model_validate(settings["recipe"]), play)
+    except ValidationError as error:
+        raise CollectionError(
+            f"this er-gym does not know the settings of the collection ({first_problem(error)}); "
+            f"verify it with the one that collected it, {manifest.er_gym}"
+        ) from error
 
 
 def _told(manifest: CollectionManifest) -> Told | None:
-    """What the settings tell; None where no agent of this er-gym played, or a model chose places"""
+    """What the settings tell; None where no agent of er-gym's played, or a model chose places.
+
+    Raises:
+        CollectionError: they are those of another version.
+    """
     settings = manifest.settings
-    if "recipe" not in settings or manifest.er_gym != __version__:
-        return None
-    if settings.get("expert", {}).get("places") == "model":
+    if "recipe" not in settings or settings.get("expert", {}).get("places") == "model":
         return None
     return _settings_of(manifest.model_dump_json())
 

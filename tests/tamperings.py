@@ -26,10 +26,17 @@ Fits: TypeAlias = Callable[[Json], object]
 
 @dataclass
 class Loot:
-    """What a poisoner has: a collection's folder, and its trajectories as they are written."""
+    """What a poisoner has.
+
+    Attributes:
+        folder: the collection's.
+        trajectories: as they are written.
+        own: whether the parts' own records of trajectories are changed, too.
+    """
 
     folder: Path
     trajectories: list[Json]
+    own: bool = True
 
     @classmethod
     def of(cls, folder: Path) -> Loot:
@@ -50,13 +57,13 @@ class Loot:
             if fits(turn)
         )
 
-    def write(self, *changed: Json, own: bool = True) -> None:
-        """Leave only these trajectories in the collection, and in the parts' own records."""
+    def write(self, *changed: Json) -> None:
+        """Leave only these trajectories in the collection."""
         lines = [json.dumps(one, ensure_ascii=False, separators=(",", ":")) for one in changed]
         (self.folder / TRAJECTORIES).write_text("".join(f"{line}\n" for line in lines))
         for one, line in zip(changed, lines, strict=True):
             part = self.folder / "parts" / one["part"]
-            if own and (part / PLAYED).is_dir():
+            if self.own and (part / PLAYED).is_dir():
                 (part / PLAYED / f"{one['id']}.json").write_text(line + "\n")
 
 
@@ -346,19 +353,18 @@ TAMPERINGS: dict[str, Tampering] = {
 # -- a second list, written when the checks for the first one were there ---------------------------
 
 
-def _manifests(change: Callable[[Json], object], *, of_parts: bool = True) -> Fits:
+def _manifests(change: Callable[[Json], object]) -> Callable[[Loot], None]:
     """Change the settings in the collection's manifest, and in those of its parts."""
 
     def changed(loot: Loot) -> None:
         files = [(loot.folder / "collection.json", "settings")]
-        if of_parts:
-            files += [(one, "agent_settings") for one in loot.folder.glob("parts/*/run.json")]
+        files += [(one, "agent_settings") for one in loot.folder.glob("parts/*/run.json")]
         for file, name in files:
             told = json.loads(file.read_text())
             change({"manifest": told, "settings": told[name]})
             file.write_text(json.dumps(told))
 
-    return changed  # type: ignore[return-value]
+    return changed
 
 
 def _turns_a_picture(loot: Loot) -> Json:
@@ -380,7 +386,7 @@ def _swaps_two_files(loot: Loot) -> Json:
 
 
 def _says_another_seed(loot: Loot) -> Json:
-    _manifests(lambda told: told["manifest"].update(seed=99))(loot)  # type: ignore[arg-type]
+    _manifests(lambda told: told["manifest"].update(seed=99))(loot)
     one = loot.one()
     one["seed"] = episode_seed(99, one["id"])
     return one
@@ -417,18 +423,18 @@ def _thinks_otherwise(loot: Loot, **fields: str) -> Json:
 
 
 def _says_an_older_version(loot: Loot) -> Json:
-    _manifests(lambda told: told["manifest"].update(er_gym="0.0.9"))(loot)  # type: ignore[arg-type]
+    _manifests(lambda told: told["manifest"].update(er_gym="0.0.9"))(loot)
     return _thinks_otherwise(loot)
 
 
 def _says_another_writer(loot: Loot) -> Json:
-    _manifests(lambda told: told["settings"].update(writer="x:Y"))(loot)  # type: ignore[arg-type]
+    _manifests(lambda told: told["settings"].update(writer="x:Y"))(loot)
     return _thinks_otherwise(loot)
 
 
 def _says_a_model_took_part(loot: Loot) -> Json:
     expert = {"name": "openai:gpt-4o", "decisions": "plan", "places": "likely", "settings": {}}
-    _manifests(lambda told: told["settings"].update(expert=expert))(loot)  # type: ignore[arg-type]
+    _manifests(lambda told: told["settings"].update(expert=expert))(loot)
     return _thinks_otherwise(loot, writer="openai:gpt-4o")
 
 
@@ -441,12 +447,12 @@ def _thinks_in_another_order(loot: Loot) -> Json:
 def _removes_the_parts_own_record(loot: Loot) -> Json:
     one = loot.one()
     (loot.folder / "parts" / one["part"] / PLAYED / f"{one['id']}.json").unlink()
-    loot.write = lambda *changed: Loot.write(loot, *changed, own=False)  # type: ignore[method-assign]
+    loot.own = False
     return one
 
 
 def _changes_the_collections_file_alone(loot: Loot) -> Json:
-    loot.write = lambda *changed: Loot.write(loot, *changed, own=False)  # type: ignore[method-assign]
+    loot.own = False
     return _thinks_otherwise(loot)
 
 

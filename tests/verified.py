@@ -29,7 +29,5 @@ def problems(folder: Path, tasks: Sequence[Task], *, pictures: bool = True) -> l
     collection = Collection.open(folder)
     backend: Any = Here()
     reenact = reenact_of(collection, tasks)
-    verdicts = verify(
-        collection, tasks, pictures=pictures, worker_backend=backend, reenact=reenact
-    )
+    verdicts = verify(collection, tasks, pictures=pictures, worker_backend=backend, reenact=reenact)
     return [f"{one.id}: {problem}" for one in verdicts for problem in one.problems]

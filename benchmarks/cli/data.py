@@ -94,12 +94,13 @@ def verify(
     suite: str | None,
     executor_options: ExecutorOptions,
 ) -> int:
-    """Replay every trajectory, and report every difference from the record.
+    """Derive every field of every trajectory anew, and report every difference from the record.
 
-    The command compares the objects in view, the results and rewards of actions, faults, feedback
-    and pictures. The critic checks the thoughts. Three rules are checked, too: trajectories of kind
-    b consist of the key actions, trajectories that must succeed do, and the agent recovers from
-    every fault. The exit code is 1 if there is a problem.
+    A replay gives what was seen, the pictures, and the results and rewards of actions; the task,
+    the settings and the seeds give the rest: what scripted agents decided and thought, and which
+    turns are learnt. Of a model, only the critic checks the thoughts. Trajectories of kind b must
+    be the key actions, those that must succeed must do so, and agents must recover from faults. The
+    exit code is 1 if there is a problem.
     """
     from contextlib import ExitStack, closing
     from itertools import islice
@@ -152,10 +153,17 @@ def verify(
         f"trajectories come out as they were recorded ({totals.turns:,} actions, "
         f"{totals.pictures:,} pictures, {totals.thoughts:,} thoughts)"
     )
+    if totals.wrong:
+        print_problem(_advice(opened))
     if not pictures:
         echo("Pictures were not compared.")
     if not totals.thoughts:
         echo("Thoughts were not checked: there are none, or no critic.")
+    elif totals.anew < totals.thoughts:
+        echo(
+            f"{totals.thoughts - totals.anew:,} thoughts were not written anew and compared, since "
+            "a model or another program wrote them; the critic has read them."
+        )
     return CRASHED if totals.wrong else 0
 
 
@@ -231,6 +239,22 @@ def _ids(collection: Collection) -> list[str]:
     if not ids:
         raise BadInput(f"{collection.path} holds no trajectory yet; run er-gym collect again")
     return ids
+
+
+def _advice(collection: Collection) -> str:
+    """What to do about trajectories that come out otherwise."""
+    from er_gym import __version__
+
+    theirs = collection.manifest.er_gym
+    if theirs != __version__:
+        return (
+            f"the collection is of er-gym {theirs}, and this is {__version__}, whose agents may "
+            f"decide otherwise; verify it with er-gym {theirs}"
+        )
+    return (
+        "do not train on these trajectories; to make them anew, remove their files "
+        f"{collection.path}/parts/PART/episodes/ID.json and run the same er-gym collect again"
+    )
 
 
 def reenact_of(collection: Collection, tasks: Sequence[Task]) -> Reenact:

@@ -123,6 +123,14 @@ def _language(origin: Origin, trajectory: Trajectory) -> Iterator[str]:
 def _cost(origin: Origin, trajectory: Trajectory) -> Iterator[str]:
     if not (origin.model or origin.selected):
         yield from compared("cost", trajectory.cost, Cost(), "the settings, which name no model")
+        return
+    models = {origin.model, trajectory.actor if trajectory.kind in QUOTING else ""} - {""}
+    asked = sum(any(each.writer in models for each in turn.thoughts) for turn in trajectory.turns)
+    if trajectory.cost.requests < asked:
+        yield (
+            f"cost.requests is at least {asked}, one for each turn with a model's thoughts, "
+            f"recorded was {trajectory.cost.requests}"
+        )
 
 
 def _correction(origin: Origin, trajectory: Trajectory) -> Iterator[str]:

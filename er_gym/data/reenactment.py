@@ -6,6 +6,7 @@ Whoever knows the agents of a collection gives a :class:`Reenact`; ``er-gym data
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from er_gym.data.collection import CollectionManifest
@@ -44,6 +45,20 @@ class Reenact(Protocol):
             trajectory: what was recorded.
         """
 
+    def writes(self, manifest: CollectionManifest, trajectory: Trajectory) -> bool:
+        """Whether a reenactment writes the thoughts of a trajectory anew, too."""
 
-def nobody(manifest: CollectionManifest, task: Task, trajectory: Trajectory) -> None:
-    """No reenactment: :class:`Reenact` of who knows no agents."""
+
+@dataclass(frozen=True)
+class Nobody:
+    """Makes no reenactments: :class:`Reenact` of who knows no agents."""
+
+    def __call__(self, manifest: CollectionManifest, task: Task, trajectory: Trajectory) -> None:
+        """See :class:`Reenact`."""
+
+    def writes(self, manifest: CollectionManifest, trajectory: Trajectory) -> bool:
+        """See :class:`Reenact`."""
+        return False
+
+
+NOBODY = Nobody()

@@ -71,6 +71,7 @@ def _perceived(turn: Turn, info: Mapping[str, Any]) -> Iterator[str]:
         for name, views in info["object_views_around"].items()
     }
     yield from compared("views", turn.views, around)
+    yield from compared("the order of views", [*turn.views], [*around])
     yield from compared("held", turn.held, info["held"])
     for name in ("navigable", "interactable"):
         yield from compared(name, getattr(turn, name), list(info[name]))

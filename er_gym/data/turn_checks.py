@@ -30,9 +30,8 @@ _PURPOSES: Mapping[Purpose, tuple[str, ...]] = {
     "finish": (verbs.END,),
 }
 """The verbs of the actions that are taken for a purpose; a purpose that is not here fits any."""
-_WITH_FULL_HAND = frozenset({"carry", "open to put", "put", "put down"})
-"""Purposes of an agent that holds something. ``put`` of an agent whose hand is empty is a mistake,
-which only a model makes."""
+_WITH_FULL_HAND = frozenset({"carry", "open to put", "put down"})
+"""Purposes of an agent that holds something. An agent may try to ``put`` what it does not hold."""
 _AGAIN = frozenset({"retry", "repeat"})
 """Purposes of the same action as before."""
 

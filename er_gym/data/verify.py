@@ -20,7 +20,7 @@ from er_gym.data.header_checks import Origin, header_problems
 from er_gym.data.knowledge import knowledge_at
 from er_gym.data.line_index import Line, lines_of, trajectory_at
 from er_gym.data.pictures import Encoding
-from er_gym.data.reenactment import Reenact, Reenactment, nobody
+from er_gym.data.reenactment import NOBODY, Reenact
 from er_gym.data.replay import replay
 from er_gym.data.shown_pictures import Album
 from er_gym.data.train_rule import QUOTING
@@ -48,6 +48,8 @@ class Verdict:
         id: the trajectory's.
         problems: in a line each; empty if all is equal and right.
         turns, pictures, thoughts: how many were compared or checked.
+        anew: how many of the thoughts were written anew and compared, too; the others are only
+            checked by the critic.
     """
 
     id: str
@@ -55,6 +57,7 @@ class Verdict:
     turns: int = 0
     pictures: int = 0
     thoughts: int = 0
+    anew: int = 0
 
 
 @dataclass
@@ -62,7 +65,7 @@ class Totals:
     """Sums of verdicts.
 
     Attributes:
-        trajectories, turns, pictures, thoughts: how many were checked.
+        trajectories, turns, pictures, thoughts, anew: how many were checked.
         wrong: how many trajectories have problems.
     """
 
@@ -70,6 +73,7 @@ class Totals:
     turns: int = 0
     pictures: int = 0
     thoughts: int = 0
+    anew: int = 0
     wrong: int = 0
 
     def add(self, verdict: Verdict) -> None:
@@ -78,6 +82,7 @@ class Totals:
         self.turns += verdict.turns
         self.pictures += verdict.pictures
         self.thoughts += verdict.thoughts
+        self.anew += verdict.anew
         self.wrong += bool(verdict.problems)
 
 
@@ -98,7 +103,7 @@ def verify(
     limit: int | None = None,
     workers: int = 1,
     worker_backend: WorkerBackend = LOCAL_BACKEND,
-    reenact: Reenact = nobody,
+    reenact: Reenact = NOBODY,
 ) -> Generator[Verdict, None, None]:
     """Verify the trajectories of a collection; the verdicts come in no particular order.
 
@@ -226,12 +231,14 @@ class _Worker:
             problems += self._caught(lambda: self._derived(task, trajectory, part))
         problems += self._thoughts_checked(trajectory)
         thoughts = sum(len(turn.thoughts) for turn in trajectory.turns)
+        anew = self._reenact.writes(self._collection.manifest, trajectory)
         return Verdict(
             line.id,
             tuple(dict.fromkeys(problems)),
             turns=trajectory.actions,
             pictures=trajectory.pictures if self._folder else 0,
             thoughts=thoughts if self._critic_works else 0,
+            anew=thoughts if anew else 0,
         )
 
     def _derived(self, task: Task, trajectory: Trajectory, part: str) -> Iterator[str]:
@@ -239,7 +246,7 @@ class _Worker:
         manifest = self._collection.manifest
         yield from header_problems(Origin(task, manifest), trajectory)
         yield from copy_problems(self._collection, trajectory)
-        played: Reenactment | None = self._reenact(manifest, task, trajectory)
+        played = self._reenact(manifest, task, trajectory)
         for name, now in played.header.items() if played else ():
             yield from compared(name, getattr(trajectory, name), now, "the seed and the settings")
         recorded = "rgb" in self._parts[part].manifest.env["obs_mode"]
