@@ -86,7 +86,8 @@ class Reenacting:
             None,
             trajectory.seed,
         )
-        return Reenacted(header, task, agent, witness, told.attempt(candidate, trajectory))
+        attempt = told.attempt(candidate, trajectory)
+        return Reenacted(header, task, None if told.model_plans else agent, witness, attempt)
 
     def writes(self, manifest: CollectionManifest, trajectory: Trajectory) -> bool:
         """See :class:`er_gym.data.reenactment.Reenact`."""
@@ -164,6 +165,11 @@ class Told:
         """Whether a model decided every action."""
         return bool(self.settings.get("expert", {}).get("decisions") == "model")
 
+    @property
+    def model_plans(self) -> bool:
+        """Whether a model chose the places that an expert searched."""
+        return bool(self.settings.get("expert", {}).get("places") == "model")
+
     def says_part(self, part: str) -> bool:
         """Whether ids name the part, as :func:`agents.expert.collect.recipe_strata` has it."""
         mine = {*self.recipe.parts[part].all_kinds}
@@ -239,13 +245,12 @@ def _settings_of(stated: str) -> Told:
 
 
 def _told(manifest: CollectionManifest) -> Told | None:
-    """What the settings tell; None where no agent of er-gym's played, or a model chose places.
+    """What the settings tell; None where no agent of er-gym's played.
 
     Raises:
         CollectionError: they are those of another version.
     """
-    settings = manifest.settings
-    if "recipe" not in settings or settings.get("expert", {}).get("places") == "model":
+    if "recipe" not in manifest.settings:
         return None
     return _settings_of(manifest.model_dump_json())
 
@@ -339,13 +344,21 @@ class Attempt:
 
 
 class Reenacted:
-    """One trajectory; :class:`er_gym.data.reenactment.Reenactment`."""
+    """One trajectory; :class:`er_gym.data.reenactment.Reenactment`.
+
+    Args:
+        header: see there.
+        task: the trajectory's.
+        agent: decides anew; None if nothing tells how.
+        witness: of the agent's thoughts.
+        attempt: the beginning of a correction; None if it is not known.
+    """
 
     def __init__(
         self,
         header: Mapping[str, Any],
         task: Task,
-        agent: ThinkingAgent,
+        agent: ThinkingAgent | None,
         witness: Witness,
         attempt: Attempt | None,
     ) -> None:
@@ -354,6 +367,8 @@ class Reenacted:
 
     def decide(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Mapping[str, Any]:
         """See :class:`er_gym.data.reenactment.Reenactment`."""
+        if self._agent is None:
+            return {}
         if self._witness.request is None:
             self._agent.reset(self._task, obs, info)
         tried = self._attempt.next(info) if self._attempt else {}
