@@ -13,13 +13,32 @@ from tamperings import MORE, TAMPERINGS, Loot
 from verified import problems
 
 from benchmarks.cli.main import cli
-from er_gym.data.collection import CollectionError
+from er_gym.data.collection import Collection, CollectionError
+from er_gym.data.header_checks import Origin, header_problems
+from er_gym.data.trajectory import Correction
 from er_gym.rollout import worker_backend
 from er_gym.tasks.suites import load_suite
 
 TASKS = load_suite("mini").tasks
 RECIPE = Path(__file__).with_name("collected.yaml")
 SMALL = ("--width", 96, "--height", 54)
+EVERY = {**TAMPERINGS, **MORE}
+DECIDED = {
+    "another goal",
+    "another destination",
+    "another plan",
+    "a thought of another kind",
+    "reasons against a thought",
+    "another kind",
+    "another mode",
+    "another actor",
+    "another seed of the collection",
+    "an episode once more",
+    "an older version of er-gym, and another thought",
+    "another package's writer, and another thought",
+    "thoughts in another order",
+}
+"""Tamperings with what nothing tells but the agents, or the settings of the collection."""
 MESSAGES = {
     "every turn is learnt, faults too": "turn 0: train is False by the rule of flags, recorded was",
     "another instruction": "instruction is 'We are going to need a Pen. Search the bedroom, and",
@@ -66,24 +85,56 @@ def test_what_nobody_touched_comes_out_again(collected: Path) -> None:
     assert problems(collected, TASKS, pictures=False) == []
 
 
-def test_every_tampering_is_found(collected: Path, tmp_path: Path) -> None:
-    """Each on a copy that holds nothing but the changed trajectory."""
-    every = {**TAMPERINGS, **MORE}
-    found = {}
-    for name, tamper in every.items():
-        copy = tmp_path / "x"
-        shutil.copytree(collected, copy)
-        loot = Loot.of(copy)
-        loot.write(tamper(loot))
+def found(collected: Path, folder: Path, *, agents: bool = True) -> dict[str, str]:
+    """What is said of each tampering, on a copy with nothing but the changed trajectory."""
+    told = {}
+    for name, tamper in EVERY.items():
+        loot = Loot.of(shutil.copytree(collected, folder / "x"))
+        changed = tamper(loot)
+        loot.write(changed)
         try:
-            found[name] = "\n".join(problems(copy, TASKS))
+            told[name] = "\n".join(problems(loot.folder, TASKS, agents=agents))
         except CollectionError as error:  # of the manifests
-            found[name] = str(error)
-        shutil.rmtree(copy)
-    assert [name for name, told in found.items() if not told] == []
-    assert len(every) >= 30
+            told[name] = str(error)
+        shutil.rmtree(loot.folder)
+    return told
+
+
+def test_every_tampering_is_found(collected: Path, tmp_path: Path) -> None:
+    told = found(collected, tmp_path)
+    assert [name for name in told if not told[name]] == []
+    assert len(told) >= 30
     for name, message in MESSAGES.items():
-        assert message in found[name], name
+        assert message in told[name], name
+
+
+def test_who_knows_no_agents_finds_all_but_what_they_decide(
+    collected: Path, tmp_path: Path
+) -> None:
+    told = found(collected, tmp_path, agents=False)
+    assert {name for name in told if not told[name]} == DECIDED
+
+
+HEADERS = {
+    "id": ({"id": "FloorPlan1-x"}, "id must begin with that of the task, 'FloorPlan"),
+    "kind": ({"kind": "played"}, "kind is a or b or c in the part 'imitation', recorded was 'play"),
+    "language": ({"language": "zh"}, "language is 'en' by the collection's settings, recorded"),
+    "actor": ({"kind": "model", "actor": "gpt"}, "actor is '' by the collection's settings, reco"),
+    "correction": (
+        {"correction": Correction(run="attempt", episode="x", first_wrong=0)},
+        "correction is Correction(run='attempt', episode='x', first_wrong=0), but the kind is 'b'",
+    ),
+}
+
+
+def test_a_header_that_does_not_fit_is_told(collected: Path) -> None:
+    collection = Collection.open(collected)
+    one = next(collection.trajectories())
+    origin = Origin(next(task for task in TASKS if task.id == one.task_id), collection.manifest)
+    assert [*header_problems(origin, one)] == []
+    for name, (update, message) in HEADERS.items():
+        told = "\n".join(header_problems(origin, one.model_copy(update=update)))
+        assert message in told, name
 
 
 def test_a_trajectory_that_is_there_twice_is_found(collected: Path, tmp_path: Path) -> None:
