@@ -320,6 +320,7 @@ def test_a_models_thoughts_are_its_own(tmp_path: Path) -> None:
     assert "unseen" in spoken.thoughts[0].refused
     # The record says what the critic has against it; the collection is verified all the same.
     assert not any(problem for each in taken.values() for problem in thought_problems(each))
+    assert problems(out, load_suite("mini").tasks) == []
 
     directory = RunDirectory.open(run)
     screening = screen([directory], load_suite("mini").tasks, SelectionRules(), seed=0)
