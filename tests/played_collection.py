@@ -14,6 +14,7 @@ from typing import Any
 
 from er_gym.data.collection import PARTS, Collection, CollectionManifest
 from er_gym.data.pictures import encode_picture
+from er_gym.data.train_rule import learnt
 from er_gym.data.trajectory import (
     Language,
     PictureRecord,
@@ -33,10 +34,11 @@ from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.tasks import verbs
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import Task
+from er_gym.writing import file_stem
 
 SUITE = load_suite("mini")
 FAULTS = {"anomalies": 0.4}
-_KINDS = {"imitation": "a", "anomalies": "anomaly", "mixed": "b"}
+_KINDS = {"imitation": "a", "anomalies": "anomaly", "mixed": "played"}
 _ILLEGAL = Action(verbs.CLOSE, "Fridge")
 _WORDS: Mapping[Language, Mapping[ThoughtKind, str]] = {
     "en": {
@@ -133,13 +135,14 @@ def _played(env: EmbodiedEnv, episode: Played, part: str, folder: Path) -> Traje
     seed = episode_seed(3, name)
     obs, told = env.reset(seed=seed, options={"task": task})
     info = with_details(env, told)
+    place = f"{PARTS}/{part}/pictures/{file_stem(name)}"
     solver, todo, at, over = Solver(), [*episode.first], "", False
     turns: list[Turn] = []
     while not over:
         action = action_of(info) if info["fault"] else todo.pop(0) if todo else solver.next(info)[0]
         views = info["object_views_around"]
         before = {
-            "pictures": _pictures(folder, f"{PARTS}/{part}/pictures/{name}", turns, obs, info),
+            "pictures": _pictures(folder, place, turns, obs, info),
             "view": [SeenObject.of(one) for one in info["object_views"]],
             "views": {name: [SeenObject.of(one) for one in seen] for name, seen in views.items()},
             "held": info["held"],
@@ -164,11 +167,10 @@ def _played(env: EmbodiedEnv, episode: Played, part: str, folder: Path) -> Traje
                 reward=float(reward),
                 feedback=info["feedback"],
                 fault=info["fault"],
-                train=info["action_success"] or bool(info["fault"]),
             )
         )
     record = record_episode(task, agent="expert", seed=seed, max_steps=info["max_steps"])
-    return Trajectory(
+    found = Trajectory(
         id=name,
         task_id=task.id,
         task_type=record.task_type,
@@ -186,6 +188,9 @@ def _played(env: EmbodiedEnv, episode: Played, part: str, folder: Path) -> Traje
         success=info["success"],
         end_reason=info["end_reason"],
     )
+    flags = zip(turns, learnt(found), strict=True)
+    learnable = [turn.model_copy(update={"train": train}) for turn, train in flags]
+    return found.model_copy(update={"turns": learnable})
 
 
 def _pictures(

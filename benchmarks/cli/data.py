@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from er_gym.data.collection import Collection
+    from er_gym.data.reenactment import Reenact
     from er_gym.data.trajectory import Trajectory
     from er_gym.tasks.task import Task
 
@@ -93,12 +94,13 @@ def verify(
     suite: str | None,
     executor_options: ExecutorOptions,
 ) -> int:
-    """Replay every trajectory, and report every difference from the record.
+    """Derive every field of every trajectory anew, and report every difference from the record.
 
-    The command compares the objects in view, the results and rewards of actions, faults, feedback
-    and pictures. The critic checks the thoughts. Three rules are checked, too: trajectories of kind
-    b consist of the key actions, trajectories that must succeed do, and the agent recovers from
-    every fault. The exit code is 1 if there is a problem.
+    A replay gives what was seen, the pictures, and the results and rewards of actions; the task,
+    the settings and the seeds give the rest: what scripted agents decided and thought, and which
+    turns are learnt. Of a model, only the critic checks the thoughts. Trajectories of kind b must
+    be the key actions, those that must succeed must do so, and agents must recover from faults. The
+    exit code is 1 if there is a problem.
     """
     from contextlib import ExitStack, closing
     from itertools import islice
@@ -115,6 +117,8 @@ def verify(
         doing(f"counting the trajectories of {collection}")
         number = sum(1 for _ in islice(lines_of(opened), limit))
         opened.parts()
+        doing("drawing what the collection's seed draws")
+        reenact = reenact_of(opened, tasks)
         if not number:
             raise BadInput(f"{collection} holds no trajectory yet; run er-gym collect again")
     totals, lines = Totals(), 0
@@ -131,6 +135,7 @@ def verify(
                 limit=limit,
                 workers=workforce.workers,
                 worker_backend=workforce.worker_backend,
+                reenact=reenact,
             )
             for verdict in stack.enter_context(closing(verdicts)):
                 totals.add(verdict)
@@ -148,10 +153,17 @@ def verify(
         f"trajectories come out as they were recorded ({totals.turns:,} actions, "
         f"{totals.pictures:,} pictures, {totals.thoughts:,} thoughts)"
     )
+    if totals.wrong:
+        print_problem(_advice(opened))
     if not pictures:
         echo("Pictures were not compared.")
     if not totals.thoughts:
         echo("Thoughts were not checked: there are none, or no critic.")
+    elif totals.anew < totals.thoughts:
+        echo(
+            f"{totals.thoughts - totals.anew:,} thoughts were not written anew and compared, since "
+            "a model or another program wrote them; the critic has read them."
+        )
     return CRASHED if totals.wrong else 0
 
 
@@ -229,12 +241,50 @@ def _ids(collection: Collection) -> list[str]:
     return ids
 
 
+def _advice(collection: Collection) -> str:
+    """What to do about trajectories that come out otherwise."""
+    from er_gym import __version__
+
+    theirs = collection.manifest.er_gym
+    if theirs != __version__:
+        return (
+            f"the collection is of er-gym {theirs}, and this is {__version__}, whose agents may "
+            f"decide otherwise; verify it with er-gym {theirs}"
+        )
+    return (
+        "do not train on these trajectories; to make them anew, remove their files "
+        f"{collection.path}/parts/PART/episodes/ID.json and run the same er-gym collect again"
+    )
+
+
+def reenact_of(collection: Collection, tasks: Sequence[Task]) -> Reenact:
+    """How the agents of a collection decide.
+
+    Args:
+        collection: the collection.
+        tasks: the suite's.
+    """
+    from benchmarks.reenacting import reenacting
+    from er_gym.data.line_index import lines_of
+    from er_gym.tasks.resolve import resolve_tasks
+
+    settings = collection.manifest.settings
+    types, scenes = settings.get("tasks", ()), settings.get("scenes", ())
+    chosen = [task for task in tasks if task.type.name in types and task.scene in scenes]
+    sizes = {part.manifest.suite_size for part in collection.parts().values()}
+    if sizes != {len(chosen)}:  # some were set aside; to find them takes long
+        chosen = [*resolve_tasks(chosen, settings.get("env", {}).get("backend", "embedded")).tasks]
+    return reenacting(collection.manifest, chosen, [*lines_of(collection)])
+
+
 def _tasks(
     collection: Collection, tasks_file: Path | None, suite_name: str | None
 ) -> Sequence[Task]:
     """The tasks of the suite that was played. No module is imported that only the collection names,
     which may be a stranger's."""
     from er_gym.data.sharegpt_import import SOURCE
+    from er_gym.envs.protocol import PAPER
+    from er_gym.tasks.paper_format import with_every_pose
     from er_gym.tasks.suites import load_suite, suite_registry
 
     told = collection.manifest
@@ -258,4 +308,6 @@ def _tasks(
             f"the tasks of {suite.name!r:.100} are not those that {collection.path} was played in; "
             "give the same ones with --tasks-file or --suite, or use the er-gym that collected it"
         )
+    if "selects" in told.settings and told.settings["env"].get("protocol") == PAPER.name:
+        return with_every_pose(suite.tasks)  # as er-gym bench played them
     return suite.tasks

@@ -12,6 +12,7 @@ import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -51,8 +52,25 @@ def encode_picture(
     return _file(rgb, size, form, {"quality": quality} if form == "jpeg" else {})
 
 
+@dataclass(frozen=True)
+class Encoding:
+    """How pictures are written.
+
+    Attributes:
+        form: ``jpeg`` or ``png``.
+        quality: of a JPEG, 1 to 100.
+    """
+
+    form: str
+    quality: int
+
+    def of(self, rgb: NDArray[np.uint8]) -> bytes:
+        """A picture, (height, width, 3) uint8, as the bytes of a file."""
+        return encode_picture(rgb, form=self.form, quality=self.quality)
+
+
 def encode_alike(rgb: NDArray[np.uint8], like: bytes) -> bytes:
-    """A picture as the bytes of a file, of the form, size and quality that another file has.
+    """A picture as the bytes of a file, of the form and quality that another file has.
 
     Args:
         rgb: (height, width, 3) uint8.
@@ -67,20 +85,35 @@ def encode_alike(rgb: NDArray[np.uint8], like: bytes) -> bytes:
         if isinstance(other, JpegImagePlugin.JpegImageFile):
             options["qtables"] = other.quantization
             options["subsampling"] = JpegImagePlugin.get_sampling(other)
-        size, form = other.size, str(other.format).lower()
-    return _file(rgb, size, form, options)
+        form = str(other.format).lower()
+    return _file(rgb, None, form, options)
 
 
-def difference(recorded: bytes, rgb: NDArray[np.uint8]) -> str:
+def difference(recorded: bytes, rgb: NDArray[np.uint8], encoding: Encoding | None = None) -> str:
     """How a recorded picture differs from a newly rendered one, in words; ``""`` if it does not.
 
     The files need not have equal bytes, as other versions of Pillow write others; their pixels must
-    be equal.
+    be equal, and so must be the size, the form and the quality. A recorded picture holds nothing by
+    which a reader might turn it, either.
+
+    Args:
+        recorded: the file's bytes.
+        rgb: (height, width, 3) uint8.
+        encoding: how it was written; None if that is not known, so that any form and quality will
+            do.
     """
     try:
-        again = encode_alike(rgb, recorded)
+        again = encode_alike(rgb, recorded) if encoding is None else encoding.of(rgb)
         if again == recorded:
             return ""
+        ours, theirs = _traits(recorded), _traits(again)
+        wrong_traits = [
+            f"its {name} is {ours[name]}, not {theirs[name]}"
+            for name in ours
+            if ours[name] != theirs[name]
+        ]
+        if wrong_traits:
+            return f"is written otherwise: {', '.join(wrong_traits)}"
         # Two steps: a difference of bytes may wrap around.
         apart = np.abs(_pixels(recorded).astype(np.int16) - _pixels(again))
     except ValueError:
@@ -89,6 +122,19 @@ def difference(recorded: bytes, rgb: NDArray[np.uint8]) -> str:
     if not wrong:
         return ""
     return f"differs in {wrong:,} of {apart[..., 0].size:,} pixels, by up to {int(apart.max())}"
+
+
+def _traits(data: bytes) -> dict[str, object]:
+    """How a picture was written, as far as that changes what is read."""
+    with _opened(data, "the picture") as picture:
+        tables = getattr(picture, "quantization", None)
+        return {
+            "form": picture.format,
+            "size": "{} x {}".format(*picture.size),
+            "mode": picture.mode,
+            "table of quality": tables and sum(map(sum, tables.values())),
+            "EXIF data": dict(picture.getexif()) or "none",
+        }
 
 
 def open_picture(source: Path | bytes) -> Image.Image:

@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from er_gym.data.pictures import difference
+from er_gym.data.comparing import compared
+from er_gym.data.reenactment import Reenactment
+from er_gym.data.shown_pictures import Album
 from er_gym.data.trajectory import SeenObject, Trajectory, Turn
 from er_gym.envs.actions import NO_ACTION
 from er_gym.envs.info import with_details
 from er_gym.rollout.play import Playable
 from er_gym.rollout.records import ERROR
-from er_gym.tasks.reading import read_bytes
 from er_gym.tasks.task import Task
-from er_gym.writing import inside, writable
-
-_AHEAD = "ahead"
-_LONGEST = 120
-"""Characters of a value that a message quotes."""
+from er_gym.writing import writable
 
 
 def replay(
-    env: Playable, task: Task, trajectory: Trajectory, folder: Path | None = None
+    env: Playable,
+    task: Task,
+    trajectory: Trajectory,
+    album: Album,
+    reenactment: Reenactment | None = None,
 ) -> Iterator[str]:
     """Repeat a trajectory's actions; yield one line for each difference from the record.
 
@@ -36,18 +33,21 @@ def replay(
             the one in which the trajectory was played, faults included.
         task: the trajectory's.
         trajectory: what was recorded.
-        folder: the collection's, to compare pictures; None to leave them out.
+        album: the pictures of its part.
+        reenactment: how its agent decides; None if nothing tells.
     """
     obs, told = env.reset(seed=trajectory.seed, options={"task": task})
     info = with_details(env, told)
     over = False
+    yield from compared("max_steps", trajectory.max_steps, info["max_steps"])
     for index, turn in enumerate(trajectory.turns):
         if over:
             yield f"turn {index}: the episode is over before it ({info['end_reason']})"
             return
-        found = [*_perceived(turn, info)]
-        if folder is not None:
-            found += _pictured(turn, obs, info, folder)
+        found = [*_perceived(turn, info), *album.problems(trajectory, index, obs, info)]
+        if reenactment is not None:
+            for name, now in reenactment.decide(obs, info).items():
+                found += compared(name, getattr(turn, name), now, "the seed, played anew")
         action = NO_ACTION if turn.verb == ERROR else turn.action
         obs, reward, terminated, truncated, told = env.step(action)
         info = with_details(env, told)
@@ -59,58 +59,30 @@ def replay(
     if not over:
         yield "the episode goes on after the last turn"
         return
-    yield from _compared("success", trajectory.success, bool(info["success"]))
-    yield from _compared("end_reason", trajectory.end_reason, info["end_reason"])
+    yield from compared("success", trajectory.success, bool(info["success"]))
+    yield from compared("end_reason", trajectory.end_reason, info["end_reason"])
 
 
 def _perceived(turn: Turn, info: Mapping[str, Any]) -> Iterator[str]:
     """What the agent perceived before the turn's action."""
-    yield from _compared("view", turn.view, [SeenObject.of(one) for one in info["object_views"]])
+    yield from compared("view", turn.view, [SeenObject.of(one) for one in info["object_views"]])
     around = {
         name: [SeenObject.of(one) for one in views]
         for name, views in info["object_views_around"].items()
     }
-    yield from _compared("views", turn.views, around)
-    yield from _compared("held", turn.held, info["held"])
+    yield from compared("views", turn.views, around)
+    yield from compared("the order of views", [*turn.views], [*around])
+    yield from compared("held", turn.held, info["held"])
     for name in ("navigable", "interactable"):
-        yield from _compared(name, getattr(turn, name), list(info[name]))
+        yield from compared(name, getattr(turn, name), list(info[name]))
 
 
 def _came_of(turn: Turn, info: Mapping[str, Any], reward: float) -> Iterator[str]:
     """What came of the turn's action."""
     done = bool(info["action_success"]) and bool(info["verb"])
-    yield from _compared("success", turn.success, done)
-    yield from _compared("reward", turn.reward, reward)
-    yield from _compared("object_id", turn.object_id, info["object_id"])
-    yield from _compared("fault", turn.fault, info["fault"])
+    yield from compared("success", turn.success, done)
+    yield from compared("reward", turn.reward, reward)
+    yield from compared("object_id", turn.object_id, info["object_id"])
+    yield from compared("fault", turn.fault, info["fault"])
     if turn.verb != ERROR:  # that feedback quotes what was said
-        yield from _compared("feedback", turn.feedback, writable(info["feedback"]))
-
-
-def _pictured(
-    turn: Turn, obs: Mapping[str, Any], info: Mapping[str, Any], folder: Path
-) -> Iterator[str]:
-    """The pictures that the agent was shown before the turn's action."""
-    frames: dict[str, NDArray[np.uint8]] = {_AHEAD: obs["rgb"], **info["views"]}
-    for picture in turn.pictures:
-        frame = frames.get(picture.direction)
-        if frame is None:
-            yield f"picture {picture.path}: there is no view {picture.direction!r} at this turn"
-            continue
-        try:
-            recorded = read_bytes(inside(folder, picture.path))
-        except ValueError as error:
-            yield f"picture {picture.path} cannot be read: {error}"
-            continue
-        if problem := difference(recorded, frame):
-            yield f"picture {picture.path} {problem}"
-
-
-def _compared(what: str, recorded: Any, now: Any) -> Iterator[str]:
-    if recorded != now:
-        yield f"{what} is {_short(now)}, recorded was {_short(recorded)}"
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+        yield from compared("feedback", turn.feedback, writable(info["feedback"]))

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import groupby, islice
 from pathlib import Path
+from typing import Any
 
 from er_gym.data import critic
-from er_gym.data.collection import Collection, CollectionError
+from er_gym.data.collection import TRAJECTORIES, Collection, CollectionError
+from er_gym.data.comparing import compared
+from er_gym.data.copies import check_manifests, copy_problems
 from er_gym.data.course_checks import course_problems
+from er_gym.data.header_checks import Origin, header_problems
 from er_gym.data.knowledge import knowledge_at
 from er_gym.data.line_index import Line, lines_of, trajectory_at
+from er_gym.data.pictures import Encoding
+from er_gym.data.reenactment import NOBODY, Reenact
 from er_gym.data.replay import replay
+from er_gym.data.shown_pictures import Album
+from er_gym.data.train_rule import QUOTING
 from er_gym.data.trajectory import Trajectory
+from er_gym.data.turn_checks import turn_problems
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.play import error_with_location
 from er_gym.rollout.processes import Terminated
@@ -26,8 +36,6 @@ from er_gym.tasks.task import Task
 
 MOST_WORDS = 200
 """The longest thought that the paper asks for, in words."""
-_QUOTING = ("model", "played")
-"""Kinds of trajectories with a model's own words."""
 _AT_ONCE = 16
 """Trajectories of one room that a worker is given at once."""
 
@@ -40,6 +48,8 @@ class Verdict:
         id: the trajectory's.
         problems: in a line each; empty if all is equal and right.
         turns, pictures, thoughts: how many were compared or checked.
+        anew: how many of the thoughts were written anew and compared, too; the others are only
+            checked by the critic.
     """
 
     id: str
@@ -47,6 +57,7 @@ class Verdict:
     turns: int = 0
     pictures: int = 0
     thoughts: int = 0
+    anew: int = 0
 
 
 @dataclass
@@ -54,7 +65,7 @@ class Totals:
     """Sums of verdicts.
 
     Attributes:
-        trajectories, turns, pictures, thoughts: how many were checked.
+        trajectories, turns, pictures, thoughts, anew: how many were checked.
         wrong: how many trajectories have problems.
     """
 
@@ -62,6 +73,7 @@ class Totals:
     turns: int = 0
     pictures: int = 0
     thoughts: int = 0
+    anew: int = 0
     wrong: int = 0
 
     def add(self, verdict: Verdict) -> None:
@@ -70,6 +82,7 @@ class Totals:
         self.turns += verdict.turns
         self.pictures += verdict.pictures
         self.thoughts += verdict.thoughts
+        self.anew += verdict.anew
         self.wrong += bool(verdict.problems)
 
 
@@ -90,6 +103,7 @@ def verify(
     limit: int | None = None,
     workers: int = 1,
     worker_backend: WorkerBackend = LOCAL_BACKEND,
+    reenact: Reenact = NOBODY,
 ) -> Generator[Verdict, None, None]:
     """Verify the trajectories of a collection; the verdicts come in no particular order.
 
@@ -100,15 +114,23 @@ def verify(
         limit: verify only the first so many.
         workers: how many processes, at least 1.
         worker_backend: where they run; they must see the collection's files.
+        reenact: knows how the collection's agents decide.
 
     Raises:
-        CollectionError: the collection is damaged.
+        CollectionError: the collection is damaged, or a part's manifest is not that of the
+            collection.
         WorkerSetupError: the environment cannot be made.
     """
     lines = list(islice(lines_of(collection), limit))
-    collection.parts()  # a damaged part is told before anything is played
+    check_manifests(collection)  # a damaged part is told before anything is played
+    twice = [name for name, count in Counter(line.id for line in lines).items() if count > 1]
+    if twice:
+        raise CollectionError(
+            f"{collection.path / TRAJECTORIES}: the trajectory {twice[0]!r:.300} is there "
+            "twice; the er-gym collect that made the collection writes the file anew"
+        )
     batches = _batches(lines, tasks)
-    make = partial(_Worker, collection.path.absolute(), pictures)
+    make = partial(_Worker, collection.path.absolute(), pictures, reenact)
     with closing(
         worker_backend.run_jobs(make, batches, workers=workers, affinity_key=_room)
     ) as results:
@@ -119,13 +141,20 @@ def verify(
                 yield from verdicts
 
 
-def thought_problems(trajectory: Trajectory) -> Iterator[str]:
+def thought_problems(
+    trajectory: Trajectory, limits: Mapping[str, int] | None = None
+) -> Iterator[str]:
     """The critic's objections to a trajectory's thoughts, one line each.
 
-    If a model decided and thought in one reply, its thoughts are kept as they are. Then it is a
-    problem only if the record lacks an objection of the critic.
+    If a model decided and thought in one reply, its thoughts are kept as they are, and the record
+    has the critic's objections. Then it is a problem only if these are others.
+
+    Args:
+        trajectory: the trajectory.
+        limits: the most words of a model's own thought of each kind; None if nothing tells them.
+            Then the record may have objections that the critic does not have now.
     """
-    quotes = trajectory.kind in _QUOTING
+    quotes = trajectory.kind in QUOTING
     for index, turn in enumerate(trajectory.turns):
         if not turn.thoughts:
             continue
@@ -135,12 +164,18 @@ def thought_problems(trajectory: Trajectory) -> Iterator[str]:
             instruction=trajectory.instruction,
             language=trajectory.language,
         )
-        for thought in turn.thoughts:
-            known = thought.refused if quotes and thought.writer != "grounded" else ()
-            for refusal in critic.check(thought.text, thought.kind, knowledge, limit=MOST_WORDS):
-                if refusal.code in known:
-                    continue
-                yield f"turn {index}: {thought.kind}: {refusal.code}: {refusal.detail}"
+        for number, thought in enumerate(turn.thoughts):
+            quoted = quotes and thought.writer == trajectory.actor
+            limit = limits[thought.kind] if quoted and limits else MOST_WORDS
+            found = critic.check(thought.text, thought.kind, knowledge, limit=limit)
+            if quoted and limits:
+                codes = [*dict.fromkeys(each.code for each in found)]
+                for line in compared("refused", thought.refused, codes, "the critic"):
+                    yield f"turn {index}: thoughts[{number}].{line}"
+                continue
+            for refusal in found:
+                if not (quoted and refusal.code in thought.refused):
+                    yield f"turn {index}: {thought.kind}: {refusal.code}: {refusal.detail}"
 
 
 def _batches(lines: Sequence[Line], tasks: Iterable[Task]) -> list[_Batch]:
@@ -168,10 +203,11 @@ def _room(batch: _Batch) -> str:
 class _Worker:
     """Verifies batches, in one environment for the part at hand."""
 
-    def __init__(self, path: Path, pictures: bool) -> None:
+    def __init__(self, path: Path, pictures: bool, reenact: Reenact) -> None:
         self._collection = Collection.open(path)
         self._parts = self._collection.parts()
         self._folder = path if pictures else None
+        self._reenact = reenact
         self._critic_works = True
         self._part = ""
         self._env: EmbodiedEnv | None = None
@@ -186,29 +222,43 @@ class _Worker:
             trajectory = trajectory_at(self._collection, line.offset)
         except CollectionError as error:
             return Verdict(line.id, (str(error),))
-        problems = [*course_problems(trajectory)]
+        problems = [*course_problems(trajectory), *turn_problems(trajectory)]
         if task is None:
             problems.append(f"the suite has no task {line.task_id!r:.80} that can be played")
         elif part not in self._parts:
             problems.append(f"the collection has no part {part!r:.80}")
         else:
-            folder = self._folder if trajectory.pictures else None
-            problems += self._caught(lambda: replay(self._of(part), task, trajectory, folder))
+            problems += self._caught(lambda: self._derived(task, trajectory, part))
         problems += self._thoughts_checked(trajectory)
         thoughts = sum(len(turn.thoughts) for turn in trajectory.turns)
+        anew = self._reenact.writes(self._collection.manifest, trajectory)
         return Verdict(
             line.id,
-            tuple(problems),
+            tuple(dict.fromkeys(problems)),
             turns=trajectory.actions,
             pictures=trajectory.pictures if self._folder else 0,
             thoughts=thoughts if self._critic_works else 0,
+            anew=thoughts if anew else 0,
         )
+
+    def _derived(self, task: Task, trajectory: Trajectory, part: str) -> Iterator[str]:
+        """What differs from the task, the settings, the part's own record and the replay."""
+        manifest = self._collection.manifest
+        yield from header_problems(Origin(task, manifest), trajectory)
+        yield from copy_problems(self._collection, trajectory)
+        played = self._reenact(manifest, task, trajectory)
+        for name, now in played.header.items() if played else ():
+            yield from compared(name, getattr(trajectory, name), now, "the seed and the settings")
+        recorded = "rgb" in self._parts[part].manifest.env["obs_mode"]
+        album = Album(recorded, self._folder if recorded else None, _encoding(manifest.settings))
+        yield from replay(self._of(part), task, trajectory, album, played)
 
     def _thoughts_checked(self, trajectory: Trajectory) -> list[str]:
         if not self._critic_works:
             return []
         try:
-            return self._caught(lambda: thought_problems(trajectory))
+            limits = self._collection.manifest.settings.get("thoughts", {}).get("limits", {})
+            return self._caught(lambda: thought_problems(trajectory, limits.get("alone")))
         except NotImplementedError:
             self._critic_works = False
             return []
@@ -238,3 +288,9 @@ class _Worker:
         env, self._env = self._env, None
         if env is not None:
             env.close()
+
+
+def _encoding(settings: Mapping[str, Any]) -> Encoding | None:
+    """How a collection's pictures are written, as its settings say."""
+    told = settings.get("pictures")
+    return Encoding(told["format"], told["quality"]) if told else None

@@ -58,8 +58,9 @@ def test_verify(er_gym: ErGym, path: Path, tmp_path: Path) -> None:
     assert "0 of 21 trajectories" in out
     assert "Pictures were not compared" in out
     lines = [line for line in err.splitlines() if line.startswith("er-gym: ")]
-    assert len(lines) == 21
-    assert lines[-1].endswith(" more")
+    assert len(lines) == 22
+    assert lines[-2].endswith(" more")
+    assert lines[-1].startswith("er-gym: do not train on these trajectories; to make them anew")
     assert "feedback is 'Done" in err
 
 

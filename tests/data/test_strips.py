@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image, ImageColor, ImageFont
+from PIL import ExifTags, Image, ImageColor, ImageFont
 from played_collection import make_collection
 
 from er_gym.data import fonts, strips
 from er_gym.data.collection import Collection
 from er_gym.data.fonts import NoFont, font_for
-from er_gym.data.pictures import difference, encode_picture
+from er_gym.data.pictures import Encoding, difference, encode_picture
 from er_gym.data.strips import COLOURS, draw_strip, wrap_text
 
 
@@ -88,11 +89,29 @@ def test_letters_that_no_font_has_are_told(monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_picture_is_compared_by_its_pixels() -> None:
     rgb = np.random.default_rng(0).integers(0, 255, (40, 60, 3), dtype=np.uint8)
     for form in ("jpeg", "png"):
-        for size in (None, (30, 20)):
-            assert difference(encode_picture(rgb, size, form=form, quality=77), rgb) == ""
+        assert difference(encode_picture(rgb, form=form, quality=77), rgb) == ""
+        assert difference(Encoding(form, 77).of(rgb), rgb, Encoding(form, 77)) == ""
     other = rgb.copy()
     other[0, 0] ^= 255
     assert difference(encode_picture(rgb, form="png"), other) == (
         f"differs in 1 of 2,400 pixels, by up to {abs(2 * rgb[0, 0].astype(int) - 255).max()}"
     )
     assert difference(b"", rgb) == "is no whole picture"
+
+
+def test_a_picture_that_was_written_otherwise_is_told() -> None:
+    rgb = np.random.default_rng(0).integers(0, 255, (40, 60, 3), dtype=np.uint8)
+    written, turned = Encoding("jpeg", 80), io.BytesIO()
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = 3  # upside down
+    Image.fromarray(rgb).save(turned, "jpeg", quality=80, exif=exif)
+    small = encode_picture(rgb, (30, 20), quality=80)
+    for data, why in (
+        (turned.getvalue(), "EXIF data is {274: 3}, not none"),
+        (small, "size is 30 x 20, not 60 x 40"),
+        (encode_picture(rgb, quality=20), "table of quality is "),
+        (encode_picture(rgb, form="png"), "form is PNG, not JPEG"),
+    ):
+        assert why in difference(data, rgb, written)
+    assert "size is 30 x 20" in difference(small, rgb)
+    assert "EXIF data" in difference(turned.getvalue(), rgb)

@@ -17,6 +17,7 @@ pytest.importorskip("openai", reason="needs the extra vlm")
 
 from click.testing import CliRunner
 from small_suite import NAME, small
+from verified import problems
 
 from agents.expert.decider import Deciders, DecidingAgent
 from benchmarks.checks.expert_server import collect_with_faults, wrong_thoughts
@@ -66,6 +67,7 @@ def test_eight_trajectories_with_a_server_that_misbehaves(tmp_path: Path) -> Non
     assert outcome.trajectories == 8
     assert outcome.thoughts["openai:scripted"] > outcome.thoughts["grounded"] > 0
     assert {"leak", "missing", "tags"} <= set(outcome.refusals)
+    assert problems(tmp_path, small().tasks) == []
 
 
 def test_what_will_not_be_taken_costs_nothing(tmp_path: Path, server: ChatServer) -> None:
@@ -79,6 +81,7 @@ def test_what_will_not_be_taken_costs_nothing(tmp_path: Path, server: ChatServer
     assert all(not list(wrong_thoughts(each)) for each in taken)
     played = list((tmp_path / "parts" / "imitation" / "trajectories").glob("*.json"))
     assert len(played) >= 3
+    assert problems(tmp_path, small().tasks) == []
 
 
 def test_the_manifest_states_the_model_and_no_secret(
@@ -93,6 +96,7 @@ def test_the_manifest_states_the_model_and_no_secret(
     assert (stated["decisions"], stated["places"]) == ("plan", "model")
     assert stated["settings"]["sampling"]["temperature"] == 0.9
     assert len(stated["settings"]["prompts_digest"]) == 64
+    assert problems(tmp_path, small().tasks) == []
     everything = b"".join(file.read_bytes() for file in tmp_path.rglob("*") if file.is_file())
     assert b"very-secret" not in everything
     other = with_expert(server.url, tmp_path, *more, "--set", "sampling.temperature=0.1")
@@ -146,6 +150,7 @@ def test_a_model_that_decides_with_the_plan_as_a_hint(tmp_path: Path, server: Ch
     assert result.return_value == 0, result.output
     taken = trajectories(tmp_path)
     assert len(taken) == 4
+    assert problems(tmp_path, small().tasks) == []
     for each in taken:
         assert (each.kind, each.part, each.actor) == ("model", "model", "openai:scripted")
         assert "For you alone" not in each.model_dump_json()
@@ -164,6 +169,7 @@ def test_with_strict_thoughts_a_lie_is_not_taken(tmp_path: Path) -> None:
     more = ("--limit", "1", "--types", "single_search", "--decisions", "model", "--hint", "plan")
     with ChatServer(answers(liar)) as server:
         with_expert(server.url, tmp_path, *more)
+    assert problems(tmp_path, small().tasks) == []
     (one,) = trajectories(tmp_path)
     assert all("unseen" in thought.refused for turn in one.turns for thought in turn.thoughts)
     prompts: Any = None
@@ -183,6 +189,7 @@ def test_an_action_that_was_refused_is_not_learnt_from(tmp_path: Path) -> None:
     with ChatServer(answers(clumsy)) as server:
         result = with_expert(server.url, tmp_path, *more)  # no room of the suite has a fridge
     assert result.return_value == 0, result.output
+    assert problems(tmp_path, small().tasks) == []
     (one,) = trajectories(tmp_path)
     assert [turn.train for turn in one.turns] == [turn.success for turn in one.turns]
     assert not one.turns[0].success
@@ -209,6 +216,7 @@ def test_a_recorded_run_becomes_trajectories(tmp_path: Path) -> None:
     decided = ("--expert", f"recorded:{run}", "--decisions", "model", *SMALL)
     result = collect(out, *more, *decided)
     assert result.return_value == 0, result.output
+    assert problems(out, small().tasks) == []
     (one,) = trajectories(out)
     assert [str(turn.action) for turn in one.turns] == actions
     assert [turn.thoughts[0].text for turn in one.turns][1] == "I go on with my very first idea."
@@ -231,6 +239,7 @@ def test_a_local_model_writes_or_is_stood_in_for(tmp_path: Path) -> None:
     assert result.return_value == 0, result.output
     assert re.search(r"tokens in \d+ replies", result.output)
     thoughts = [t for each in trajectories(out) for turn in each.turns for t in turn.thoughts]
+    assert problems(out, small().tasks) == []
     assert {each.writer for each in thoughts} == {"grounded"}  # it speaks at random
     assert all(len(each.refused) >= 3 for each in thoughts)
     ledger = (out / "spending.jsonl").read_text().splitlines()

@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 from sampled_agents import TASKS
+from verified import problems
 
 from agents.expert.collect import correction_strata
 from agents.expert.players import PlaySettings
@@ -40,7 +41,7 @@ from benchmarks.cli.main import cli
 from er_gym.data.collection import Collection
 from er_gym.data.dialects import load_dialect
 from er_gym.data.trajectory import Trajectory
-from er_gym.data.verify import thought_problems, verify
+from er_gym.data.verify import thought_problems
 from er_gym.envs.actions import Action
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.tasks import load_suite
@@ -186,8 +187,7 @@ def test_what_is_taken_and_why_the_rest_is_not(run: Path, collected: Path) -> No
         assert row["played"] == row["kept"] + sum(row["left_out"].values()) == SAMPLES
     reasons = {reason for row in rows.values() for reason in row["left_out"]}
     assert reasons == {"no success", "the same actions", "an action failed"}
-    found = list(verify(Collection.open(collected), load_suite("mini").tasks))
-    assert [each.problems for each in found] == [()] * len(taken)
+    assert problems(collected, load_suite("mini").tasks) == []
 
 
 def test_two_workers_and_a_kill_change_nothing(run: Path, collected: Path, tmp_path: Path) -> None:
@@ -320,6 +320,7 @@ def test_a_models_thoughts_are_its_own(tmp_path: Path) -> None:
     assert "unseen" in spoken.thoughts[0].refused
     # The record says what the critic has against it; the collection is verified all the same.
     assert not any(problem for each in taken.values() for problem in thought_problems(each))
+    assert problems(out, load_suite("mini").tasks) == []
 
     directory = RunDirectory.open(run)
     screening = screen([directory], load_suite("mini").tasks, SelectionRules(), seed=0)
