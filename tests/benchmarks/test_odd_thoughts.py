@@ -60,9 +60,11 @@ TAKES = {"verb": verbs.PICKUP, "object_type": "Mug", "purpose": "take"}
     [  # the kind; a language; the turns before; an odd turn; one that is not
         (GUESS, "en", [SEEN], turn("I'll go.", object_type="Sofa"), turn("I saw the mug on the desk.", object_type="Desk", purpose="approach")),
         (GUESS, "zh", [SEEN], turn("马克杯可能在书桌上。", purpose="approach"), turn("之前马克杯在书桌上。", purpose="approach")),
-        (WALKS, "en", [], turn("I see it.", view=ON_DESK, purpose="approach"), turn("I see it.", object_type="Desk", view=ON_DESK, purpose="approach")),
+        (WALKS, "en", [], turn("I see it.", view=ON_DESK, purpose="approach", navigable=["Desk"]), turn("I see it.", object_type="Desk", view=ON_DESK, purpose="approach", navigable=["Desk"])),
+        (WALKS, "en", [], turn("I see it.", view=ON_DESK, purpose="approach", navigable=["Desk"]), turn("I can't go to the desk.", view=ON_DESK, purpose="approach")),
         (WALKS, "en", [], turn("I look.", view=ON_DESK, **LOOK), turn("I look.", **LOOK)),
         (USUAL, "en", [turn("I see only a book on the desk.")], turn("People often keep a mug on the desk."), turn("People often keep a mug on the shelf.")),
+        (USUAL, "en", [turn("There is a book on the desk.")], turn("The desk is a likely place for a mug."), turn("The mug might be on the desk.")),
         (USUAL, "zh", [turn("书桌上只有一本书。")], turn("马克杯通常放在书桌上。"), turn("马克杯通常放在架子上。")),
         (HARD, "en", [], turn("The hard part was finding it.", **HELD), turn("I'm on my way.", **HELD)),
         (UNSURE, "en", [turn("")], turn("I can't tell whether it worked."), turn("Once more can't hurt.")),

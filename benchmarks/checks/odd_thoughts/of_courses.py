@@ -9,7 +9,7 @@ from benchmarks.checks.odd_thoughts.moment import Moment
 from er_gym.data.claims import PARTS
 from er_gym.data.mentions import all_interchangeable
 from er_gym.data.phrases import MARK
-from er_gym.data.reading import Clause, read
+from er_gym.data.reading import PHRASES, Clause, read
 from er_gym.data.remembered import SEARCHING
 from er_gym.data.trajectory import Language
 from er_gym.tasks import verbs
@@ -32,6 +32,7 @@ def walks_on(at: Moment) -> Iterator[str]:
     places |= {part for each in places for part in PARTS.get(each, ())}
     leaves = turn.verb == verbs.NAVIGATE and all(each.on for each in there)
     leaves = leaves and turn.purpose in ("search", "approach")
+    leaves = leaves and any(is_among(each, turn.navigable) for each in places)
     if turn.purpose == "look around" or (leaves and not is_among(turn.object_type, places)):
         yield f"{known.sought} is in view, on {there[0].on or '?'}; {turn.action}"
 
@@ -58,10 +59,9 @@ def usual_after_all(at: Moment) -> Iterator[str]:
     for text in at.texts:
         for clause in read(text, at.language):
             if _USUAL[at.language].search(clause.text):
-                about = [each.types for each in clause.mentions]
-                others = [types for types in about if not types & {*sought}]
-                places = {each for types in others for each in types}
-                if len(others) < len(about) and any(
+                others = [each for each in clause.mentions if not each.types & {*sought}]
+                places = {each.text.lower() for each in others}
+                if len(others) < len(clause.mentions) and any(
                     _denies(one, places, at.language) for one in said
                 ):
                     yield clause.text
@@ -69,8 +69,16 @@ def usual_after_all(at: Moment) -> Iterator[str]:
 
 
 def _denies(clause: Clause, places: set[str], language: Language) -> bool:
-    mine = {each for mention in clause.mentions for each in mention.types}
-    return bool(mine & places) and bool(_ONLY[language].search(clause.text)) and not clause.guessed
+    mine = {mention.text.lower() for mention in clause.mentions}
+    if clause.guessed or not mine & places:
+        return False
+    holders = (
+        each.text.lower()
+        for phrase in PHRASES[language].on
+        for match in phrase.finditer(clause.text)
+        for each in clause.named(match, "y")
+    )
+    return bool(_ONLY[language].search(clause.text)) or bool(places & {*holders})
 
 
 def _since(at: Moment) -> int:
@@ -86,7 +94,7 @@ _HARD: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(
         r"\bhard part was\b|\btook (?:a while|some time) to find\b|\bat last\b|\bfinally\b"
     ),
-    "zh": re.compile(r"好不容易|最难的|终于|费了"),
+    "zh": re.compile(r"好不容易|最难的|终于|费了(?!一步)"),
 }
 
 

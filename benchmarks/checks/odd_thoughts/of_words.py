@@ -17,12 +17,12 @@ from er_gym.thor import OBJECT_TYPES
 _VERBS: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(
         PHRASES["en"].verb.pattern
-        + r"|\b(?:keeps?|comes?|belongs?|settles|matters|rules|fits|turned|get|try|changed|said"
-        r"|no matter|never mind|no harm done|complete[sd]?|conclude[sd]?|one thing at a time"
-        r"|another try|one more try)\b|\w\?"
+        + r"|\b(?:keeps?|gave|matche?s?|suggests|cost|comes?|belongs?|settles|matters|rules|fits"
+        r"|turned|get|try|changed|said|made|happen|complete[sd]?|conclude[sd]?|no matter"
+        r"|never mind|no harm done|one thing at a time|another try|one more try)\b|\w\?"
     ),
     "zh": re.compile(
-        r"[是有在要去放拿看找打关开走得能可没不做处理过了想像会来到等用试回送取记切说给对比剩查收落留够结空滑算止摆靠近作]"
+        r"[是有在要去放拿看找打关开走得能可没不做处理过了想像会来到等用试回送取记切说给对比剩查收落留够结空滑算止摆靠近作顾]"
     ),
 }
 _HALF: Mapping[Language, re.Pattern[str]] = {
