@@ -11,9 +11,11 @@ from agents.expert.course import Course, Intent, View
 from agents.expert.prescreen import SilentAgent
 from agents.expert.recipe import Part
 from agents.expert.thought_kinds import load_thought_kinds
+from er_gym.data.remembered import SEARCHING
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.rollout.records import EpisodeRecord
+from er_gym.tasks.equivalence import same_type
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import Task
 
@@ -71,6 +73,22 @@ class Played:
     def problem(self) -> str:
         """Why it would not be taken."""
         return rejection(self.course, MOST)
+
+
+def searched_though_seen(played: Played) -> list[str]:
+    """The learnt decisions to search for something that is or was in view."""
+    seen: set[str] = set()
+    found = []
+    for intent, view in played.noted:
+        around = view.info["object_views_around"].values()
+        views = (*view.info["object_views"], *(each for way in around for each in way))
+        seen.update(each.object_type for each in views)
+        goal = intent.subgoal
+        sought = goal.place if goal.thing == view.held else goal.thing
+        searches = intent.train and intent.purpose in SEARCHING
+        if searches and any(same_type(sought, each) for each in seen):
+            found.append(f"{played.candidate.id}: {intent.action} for {sought}")
+    return found
 
 
 def environment(**more: object) -> EmbodiedEnv:

@@ -6,6 +6,7 @@ from random import Random
 
 from agents.expert.course import Intent
 from agents.expert.legs import Leg
+from agents.expert.memory import Sighting
 from agents.expert.places import (
     DrawnPlaces,
     PlaceChooser,
@@ -31,7 +32,9 @@ class ExpertCourse(TaskCourse):
 
     As in the paper (arXiv 2503.21696): the first search follows the mode; each later search has as
     many places, the right one at a random index. Wrong places are plausible ones. If the right
-    place is not known when its turn comes, the expert looks around. In kind ``b`` the course is the
+    place is not known when its turn comes, the expert looks around. What it has seen it does not
+    search for: it goes back there, also from a wrong place of its plan; if the task is about
+    another object of the type, the course is given up. In kind ``b`` the course is the
     key actions and nothing else; where that is impossible it is given up.
 
     Args:
@@ -78,16 +81,20 @@ class ExpertCourse(TaskCourse):
             if place:
                 yield from self._go(place, "carry" if purpose == "carry" else "approach")
                 return True
-            yield from self._show_place(leg, ())
+            seen = self._memory.of(leg.place)
+            if seen is not None and not self._strict:
+                yield from self._go_back(seen, leg.place)
+            else:
+                yield from self._show_place(leg, ())
         raise GiveUp
 
     def _search(self, leg: Leg) -> Intents:
-        """Go through the plan until the right place is reached."""
+        """Go through the plan until the right place is reached, or the object was in view."""
         plan = self._plan(leg)
         wrong: list[str] = []
         for number, place in enumerate(plan):
             right = self._known(leg.place)
-            if place == leg.place or self._in_view(leg.thing) or len(wrong) >= _MOST_WRONG:
+            if place == leg.place or self._memory.of(leg.thing) or len(wrong) >= _MOST_WRONG:
                 break
             rest = tuple(right if each == leg.place and right else each for each in plan[number:])
             wrong.append(place)
@@ -95,25 +102,38 @@ class ExpertCourse(TaskCourse):
                 if any(key.verb == verbs.OPEN for key in leg.actions):
                     raise GiveUp  # the task is about another object of the type
                 break
+        if not self._known(leg.place) and not self._memory.of(leg.thing):
+            yield from self._show_place(leg, tuple(wrong))
+        if seen := self._memory.of(leg.thing):
+            return (yield from self._return_to(seen, leg))
         place = self._known(leg.place)
         if not place:
-            yield from self._show_place(leg, tuple(wrong))
-            place = self._known(leg.place)
-        if not place:
             raise GiveUp
-        if self._in_view(leg.thing):
-            return (yield from self._go(place, "approach"))
         left = [each for each in plan if each not in wrong and each != leg.place]
         return (yield from self._go(place, "search", (place, *left)))
 
+    def _return_to(self, seen: Sighting, leg: Leg) -> Intents:
+        """Go to the place of an object that is or was in view."""
+        if not seen.fits(leg.place):
+            raise GiveUp  # the task is about another object of the type
+        if not self._known(leg.place) and not self._strict:
+            yield from self._go_back(seen, leg.place)
+        place = self._known(leg.place)
+        if not place:
+            raise GiveUp
+        return (yield from self._go(place, "approach"))
+
     def _plan(self, leg: Leg) -> list[str]:
         self._searches += 1
+        seen = self._memory.of(leg.thing) is not None
         if self._kind == "b":
             mode = self._mode if self._searches == 1 else "1"
         elif self._searches == 1:
-            if self._in_view(leg.thing) and "0" in self._mode:
+            if seen and "0" in self._mode:
                 raise GiveUp  # nobody searches elsewhere for what is in view
             mode = self._mode
+        elif seen:
+            mode = "1"
         else:
             wrong = len(self._mode) - 1
             index = self._random.randint(0, wrong)
@@ -123,16 +143,17 @@ class ExpertCourse(TaskCourse):
         return plan_of(mode, leg.place, wrong_places)
 
     def _show_place(self, leg: Leg, visited: tuple[str, ...]) -> Intents:
-        """Look around, and once more from another place, until the right place is known."""
+        """Look around, and once more from another place, until the right place is known or the
+        object was in view."""
         if self._strict:
             raise GiveUp
         yield from self._look_around()
-        if self._known(leg.place):
+        if self._known(leg.place) or (leg.hidden and self._memory.of(leg.thing)):
             return True
         others = likely_places(leg.thing, self.view.navigable, without=[leg.place, *visited])
         for place in draw_places(others, 1, self._random, temperature=0.0):
             yield from self._visit(place, leg, (place,))
-            if not self._known(leg.place):
+            if not self._known(leg.place) and not (leg.hidden and self._memory.of(leg.thing)):
                 yield from self._look_around()
         return bool(self._known(leg.place))
 
@@ -170,6 +191,9 @@ class CorrectedCourse(ExpertCourse):
         place = self._known(leg.place)
         lost = not (self._in_view(leg.thing) or same_type(self.view.held, leg.thing))
         if leg.hidden and place and lost:
+            if self._memory.of(leg.thing):
+                yield from self._go(place, "approach")
+                return (yield from self._look_inside(place, leg))
             return (yield from self._visit(place, leg, (place,)))
         return (yield from super()._get_closer(key, leg, attempt))
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import cos, radians
 from random import Random
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from agents.expert.course import Intent
 from agents.expert.legs import Leg
+from agents.expert.memory import Sighting
 from agents.expert.places import draw_places, likely_places
 from agents.expert.task_course import GiveUp, Intents, TaskCourse
 from agents.expert.thought_kinds import Check
 from er_gym.envs.actions import Action
-from er_gym.envs.object_view import ObjectView
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import same_type
 from er_gym.tasks.task import KeyAction, Task
@@ -49,7 +47,7 @@ class Strength(BaseModel):
 class ExplorerCourse(TaskCourse):
     """Searches places by their likelihood until the object is in view.
 
-    It knows the goal of the task, but not where objects are.
+    What it has seen it goes back to. It knows the goal of the task, but not where objects are.
 
     Args:
         task: the task.
@@ -75,7 +73,7 @@ class ExplorerCourse(TaskCourse):
     def _find(self, leg: Leg) -> Intents:
         tried: list[str] = []
         looks = 0
-        if leg.hidden and self._must_search and self._in_view(leg.thing):
+        if leg.hidden and self._must_search and self._memory.of(leg.thing):
             raise GiveUp
         self._must_search = self._must_search and not leg.hidden
         if self._random.random() < self._strength.blunders:
@@ -83,14 +81,17 @@ class ExplorerCourse(TaskCourse):
         while True:
             if self._ready(leg):
                 return True
-            near = self._way_to(leg)
-            if near and near not in tried:
+            seen = self._memory.of(leg.thing if leg.hidden else leg.place)
+            near = self._way_to(leg, seen, tried)
+            if near:
                 tried.append(near)
                 if (yield from self._approach(near, leg)):
                     return True
                 continue
+            if seen:
+                raise GiveUp  # it knows where to look, but cannot get there
             places = self._next_places(leg, tried)
-            if not places or (len(tried) >= 3 and looks == 0 and not near):
+            if not places or (len(tried) >= 3 and looks == 0):
                 if looks >= _LOOKS:
                     raise GiveUp
                 looks += 1
@@ -110,7 +111,8 @@ class ExplorerCourse(TaskCourse):
         return False
 
     def _approach(self, near: str, leg: Leg) -> Intents:
-        yield from self._go(near, "carry" if self.view.held else "approach")
+        carries = self.view.held and not leg.hidden and same_type(near, leg.place)
+        yield from self._go(near, "carry" if carries else "approach")
         if not self._ready(leg):
             yield from self._look_inside(near, leg)
         return self._ready(leg)
@@ -126,30 +128,20 @@ class ExplorerCourse(TaskCourse):
             return any(self._legal(key) is not None for key in left[1:2])
         return self._legal(first) is not None
 
-    def _way_to(self, leg: Leg) -> str:
-        """Where to go for an object whose place is known: named, or in view."""
-        if not leg.hidden:
-            return self._known(leg.place)
-        views = self._views()
-        for view in views:
-            if same_type(view.object_type, leg.thing):
-                names = [view.on, view.object_type, *_nearest_to(view, self._ahead())]
-                return next((name for name in names if name in self.view.navigable), "")
-        return ""
-
-    def _ahead(self) -> Sequence[ObjectView]:
-        views: Sequence[ObjectView] = self.view.info["object_views"]
-        return views
-
-    def _views(self) -> list[ObjectView]:
-        around = self.view.info["object_views_around"]
-        return [*self._ahead(), *(view for each in around.values() for view in each)]
+    def _way_to(self, leg: Leg, seen: Sighting | None, tried: list[str]) -> str:
+        """Where to go, and has not gone yet, for what is named, or is or was in view."""
+        named = "" if leg.hidden else self._known(leg.place)
+        ways = [named] if named else self._ways(seen) if seen else []
+        return next((name for name in ways if name not in tried), "")
 
     def _next_places(self, leg: Leg, tried: list[str]) -> list[str]:
         weighted = likely_places(leg.thing, self.view.navigable, without=tried)
         return draw_places(weighted, _SHOWN, self._random, self._strength.temperature)
 
     def _do_key(self, key: KeyAction, leg: Leg) -> Intents:
+        seen = self._memory.of(leg.thing) if leg.hidden and key.verb == verbs.OPEN else None
+        if seen is not None and not seen.fits(key.actual_type):
+            raise GiveUp  # what it looks for lies elsewhere
         if self._random.random() < self._strength.blunders:
             yield from self._blunder(key, leg)
         return (yield from super()._do_key(key, leg))
@@ -171,14 +163,3 @@ class ExplorerCourse(TaskCourse):
         if key.verb in (verbs.PUT, verbs.TOGGLE, verbs.CLOSE):
             raise GiveUp  # it takes the task for done
         return False
-
-
-def _nearest_to(goal: ObjectView, views: Sequence[ObjectView]) -> list[str]:
-    """The types of the objects in view, those nearest to an object in view first."""
-
-    def apart(view: ObjectView) -> float:
-        angle = radians(view.bearing - goal.bearing)
-        square = view.distance**2 + goal.distance**2
-        return square - 2 * view.distance * goal.distance * cos(angle)
-
-    return [view.object_type for view in sorted(views, key=apart)]

@@ -16,6 +16,7 @@ from agents.expert.thought_kinds import ThoughtKinds
 from agents.expert.writers.base import ThoughtWriter
 from agents.vlm.settings import Pictures
 from er_gym.data.collection import PARTS
+from er_gym.data.remembered import searches_for_the_seen
 from er_gym.data.trajectory import Correction, Language, Trajectory
 from er_gym.rollout.agent import Agent, MakeAgent
 from er_gym.tasks.task import Task
@@ -112,8 +113,12 @@ class Thinkers:
         )
 
     def rejection(self, trajectory: Trajectory, most_actions: int) -> str:
-        """See :func:`agents.expert.acceptance.rejection`."""
-        return rejection(PlayedCourse.of_trajectory(trajectory), most_actions)
+        """See :func:`agents.expert.acceptance.rejection`; nor is one that searches for what it has
+        seen, as an explorer's or a searcher's may."""
+        reason = rejection(PlayedCourse.of_trajectory(trajectory), most_actions)
+        if not reason and any(searches_for_the_seen(trajectory)):
+            return "it searches for what it has seen"
+        return reason
 
 
 def header_of(candidate: Candidate, settings: PlaySettings) -> TrajectoryHeader:

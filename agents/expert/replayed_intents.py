@@ -6,14 +6,21 @@ from collections.abc import Sequence
 
 from agents.expert.course import Intent, View
 from agents.expert.legs import Leg, at_hand
+from agents.expert.memory import Memory, Sighting
 from er_gym.data.trajectory import Purpose, Subgoal
 from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
-from er_gym.tasks.equivalence import same_type
+from er_gym.tasks.equivalence import is_among, same_type
 
 
 def replayed_intent(
-    action: Action, view: View, legs: Sequence[Leg], *, train: bool, again: bool = False
+    action: Action,
+    view: View,
+    legs: Sequence[Leg],
+    *,
+    train: bool,
+    again: bool = False,
+    memory: Memory | None = None,
 ) -> Intent:
     """The probable intent of an action.
 
@@ -23,6 +30,7 @@ def replayed_intent(
         legs: of the task.
         train: whether the turn is to be learnt from.
         again: whether the same action has just been refused.
+        memory: what the agent has seen: who goes where a thing was does not search for it.
     """
     here = at_hand(legs, view.left)
     subgoal = here[1] if here else Subgoal()
@@ -32,7 +40,9 @@ def replayed_intent(
     purpose = replayed_purpose(action, view.held, place)
     if again:
         purpose = "retry"
-    elif purpose == "search" and _in_view(sought, view):
+    elif purpose == "search" and (
+        _in_view(sought, view) or _goes_back(action, memory.of(sought) if memory else None)
+    ):
         purpose = "approach"
     return Intent(
         action,
@@ -68,6 +78,10 @@ _PURPOSES: dict[str, Purpose] = {
     verbs.MOVE_FORWARD: "get closer",
     verbs.END: "finish",
 }
+
+
+def _goes_back(action: Action, seen: Sighting | None) -> bool:
+    return seen is not None and is_among(action.object_type, (seen.on, seen.thing))
 
 
 def _in_view(thing: str, view: View) -> bool:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
-from agents.expert.course import Intent, View
+from agents.expert.course import Intent
 from agents.expert.legs import legs_of
+from agents.expert.memory import Remembering
 from agents.expert.replayed_intents import replayed_intent
 from agents.scripted.searcher import instruction
 from agents.scripted.searcher.agent import SearcherAgent
@@ -18,7 +19,7 @@ from er_gym.tasks.equivalence import same_type
 from er_gym.tasks.task import KeyAction, Task
 
 
-class SearcherCourse:
+class SearcherCourse(Remembering):
     """Repeats the beginning of a failed episode, then lets the searcher finish the task.
 
     The searcher knows the instruction and what the episode has seen, as the failed agent did; it is
@@ -29,9 +30,8 @@ class SearcherCourse:
         beginning: the actions, the wrong one last.
     """
 
-    view: View
-
     def __init__(self, task: Task, beginning: Sequence[Action]) -> None:
+        super().__init__()
         self._task, self._beginning = task, beginning
         self._legs = legs_of(task)
 
@@ -49,7 +49,14 @@ class SearcherCourse:
             assert isinstance(decided, Decision)
             assert isinstance(decided.action, Action)
             again = decided.action == refused
-            yield replayed_intent(decided.action, self.view, self._legs, train=True, again=again)
+            yield replayed_intent(
+                decided.action,
+                self.view,
+                self._legs,
+                train=True,
+                again=again,
+                memory=self._memory,
+            )
             refused = None if self.view.success else decided.action
 
     def _done(self) -> Iterator[KeyAction]:

@@ -7,8 +7,9 @@ from dataclasses import replace
 from random import Random
 from typing import TypeAlias
 
-from agents.expert.course import Intent, View
+from agents.expert.course import Intent
 from agents.expert.legs import Leg, keys_left, legs_of, purpose_of
+from agents.expert.memory import Remembering, Sighting
 from agents.expert.thought_kinds import Check
 from agents.scripted.searcher import search_priors
 from er_gym.data.trajectory import Purpose, Subgoal
@@ -22,6 +23,8 @@ Intents: TypeAlias = Generator[Intent, None, bool]
 """Yields decisions and returns whether their aim was reached."""
 _RESERVE = 1
 """Steps kept for ``end``."""
+_WAYS = 3
+"""So many ways to something that was seen are tried."""
 _TRIES = 5
 """An action that is out of reach is given up after this many tries to get closer."""
 
@@ -30,7 +33,7 @@ class GiveUp(Exception):
     """The course cannot be finished as planned; the episode ends."""
 
 
-class TaskCourse:
+class TaskCourse(Remembering):
     """Goes to the place of each leg and does its key actions; subclasses find the places.
 
     Args:
@@ -42,8 +45,6 @@ class TaskCourse:
         strict: whether the course is given up when it needs more than the key actions.
     """
 
-    view: View
-
     def __init__(
         self,
         task: Task,
@@ -54,6 +55,7 @@ class TaskCourse:
         repeats: float = 0.0,
         strict: bool = False,
     ) -> None:
+        super().__init__()
         self._task, self._random, self._check = task, random, check
         self._retries, self._repeats, self._strict = retries, repeats, strict
         self._legs = legs_of(task)
@@ -204,6 +206,14 @@ class TaskCourse:
         action = Action(verbs.OBSERVE)
         return (yield from self._do(Intent(action, "look around", self._subgoal)))
 
+    def _go_back(self, seen: Sighting, wanted: str) -> Intents:
+        """Go where something was seen, until the agent may navigate to a type."""
+        for place in self._ways(seen):
+            if self._known(wanted):
+                break
+            yield from self._go(place, "approach")
+        return bool(self._known(wanted))
+
     # -- what is known ---------------------------------------------------------------------------
 
     def _left(self, leg: Leg) -> tuple[int, ...]:
@@ -224,6 +234,11 @@ class TaskCourse:
         if wanted in self.view.navigable:
             return wanted
         return next((name for name in self.view.navigable if same_type(name, wanted)), "")
+
+    def _ways(self, seen: Sighting) -> list[str]:
+        """Where the agent may go for something that it has seen, the best first."""
+        ways = (name for name in seen.ways if name in self.view.navigable)
+        return [name for name in ways if name != self._memory.at][:_WAYS]
 
     def _in_view(self, thing: str) -> bool:
         return any(same_type(name, thing) for name in self.view.visible) and (

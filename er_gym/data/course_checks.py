@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from er_gym.data.remembered import searches_for_the_seen
 from er_gym.data.trajectory import Trajectory
 from er_gym.envs.actions import Action
 from er_gym.rollout.records import KeyActionRecord
@@ -23,7 +24,9 @@ def course_problems(trajectory: Trajectory) -> Iterator[str]:
     - A trajectory of a kind that must succeed does.
     - One of kind ``b`` consists of the task's key actions.
     - After a fault the same action is done later, or the episode succeeds.
+    - No turn that is learnt from searches for what had been seen.
     """
+    yield from searches_for_the_seen(trajectory)
     if trajectory.kind in MUST_SUCCEED and not trajectory.success:
         yield f"kind {trajectory.kind} must succeed, but it ended in {trajectory.end_reason!r}"
     if trajectory.kind == SHORTEST and not is_key_actions(trajectory):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from er_gym.data import action_claims, claims, form
+from er_gym.data import action_claims, claims, form, remembered
 from er_gym.data.knowledge import Knowledge
 from er_gym.data.thought import Refusal, Thought
 from er_gym.data.trajectory import ThoughtKind
@@ -39,9 +39,11 @@ CHECKS: tuple[Callable[[Thought], Iterator[Refusal]], ...] = (
     action_claims.check_history,
     action_claims.check_outcome,
     action_claims.check_decision,
+    remembered.check_remembered,
 )
 """Every check. Codes: ``length``, ``language``, ``tags``, ``leak``, ``repeat``, ``unseen``,
-``hidden``, ``support``, ``side``, ``count``, ``state``, ``held``, ``history``, ``decision``."""
+``hidden``, ``support``, ``side``, ``count``, ``state``, ``held``, ``history``, ``decision``,
+``remembered``."""
 
 
 def check(text: str, kind: ThoughtKind, knowledge: Knowledge, *, limit: int) -> tuple[Refusal, ...]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from er_gym.data.trajectory import Language, Purpose, SeenObject, Subgoal, ThoughtRecord, Turn
 from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
+from er_gym.tasks.equivalence import is_among, same_type
 
 AROUND = frozenset({"right", "behind", "left"})
 """The directions of the pictures after ``observe``."""
@@ -66,6 +67,8 @@ class Knowledge:
         at: the type last navigated to, ``""`` at first.
         seen: every object type that is or was in view, with the place (the type last navigated to,
             ``""`` for the start) where it was in view last.
+        lay: of those, on what each lay when it was in view last, or where the agent has put it
+            since.
         visits: the places searched for the present subgoal, in order.
         navigable, interactable: the object types that are legal targets now.
         last: the last action; None at the first turn.
@@ -86,6 +89,7 @@ class Knowledge:
     subgoal: Subgoal
     views: Mapping[str, Sequence[SeenObject]] = field(default_factory=dict)
     seen: Mapping[str, str] = field(default_factory=dict)
+    lay: Mapping[str, str] = field(default_factory=dict)
     visits: Sequence[Visit] = ()
     navigable: Sequence[str] = ()
     interactable: Sequence[str] = ()
@@ -99,6 +103,21 @@ class Knowledge:
         """The object types in view now, those of the views after ``observe`` included."""
         around = (each.type for view in self.views.values() for each in view)
         return frozenset((*(each.type for each in self.view), *around))
+
+    @property
+    def sought(self) -> str:
+        """The type that the agent looks for: the thing of its goal, or the place once it holds the
+        thing; ``""`` for none."""
+        goal = self.subgoal
+        return goal.place if goal.thing and goal.thing == self.held else goal.thing
+
+    def remembers(self, object_type: str) -> bool:
+        """Whether a type is or was in view, or one that counts as the same."""
+        return is_among(object_type, self.seen)
+
+    def where(self, object_type: str) -> str:
+        """On what a type lay when it was in view last, ``""`` if that is unknown."""
+        return next((on for each, on in self.lay.items() if same_type(each, object_type)), "")
 
 
 def knowledge_at(
@@ -114,10 +133,15 @@ def knowledge_at(
     """
     turn, before = turns[index], turns[:index]
     seen: dict[str, str] = {}
+    lay: dict[str, str] = {}
     for each in (*before, turn):
         around = (one for view in each.views.values() for one in view)
-        for one in (*each.view, *around):
+        for one in (*reversed(list(around)), *reversed(each.view)):  # the nearest is the last
             seen[one.type] = each.at
+            if one.type != each.held:
+                lay[one.type] = one.on
+        if each is not turn and each.success and each.verb == verbs.PUT and each.held:
+            lay[each.held] = each.object_type
     actions = [
         LastAction(
             action=each.action,
@@ -138,6 +162,7 @@ def knowledge_at(
         held=turn.held,
         at=turn.at,
         seen=seen,
+        lay={kind: on for kind, on in lay.items() if on and kind != turn.held},
         visits=_visits(before, turn.subgoal),
         navigable=turn.navigable,
         interactable=turn.interactable,

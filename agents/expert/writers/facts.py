@@ -2,7 +2,8 @@
 
 Facts that the wordings use (``configs/thoughts``):
 
-- ``purpose``, ``verb``, ``outcome`` (:func:`agents.expert.writers.outcomes.outcome_of`),
+- ``purpose`` (a turn's, or ``recall``: to go to what was seen before and is not in view),
+  ``verb``, ``outcome`` (:func:`agents.expert.writers.outcomes.outcome_of`),
   ``goal_verb``; ``problem`` (why an action was refused), ``closing`` (why a container is closed:
   taken, placed or empty), ``ended`` (what the end shows: put, pickup, toggle or find), ``power``
   (whether the thing is on or off);
@@ -14,19 +15,22 @@ Facts that the wordings use (``configs/thoughts``):
   ``later_thing`` (of the part to come), ``done_thing`` and ``done_place`` (of the part done);
 - things, each with the facts of :func:`_described`: ``object_view``, ``sought_view``,
   ``place_view``, ``last_view`` (in view now), ``object_memory``, ``sought_memory``,
-  ``place_memory`` (seen before);
+  ``place_memory`` (seen before, with ``seen_at``, ``at_start`` and ``o_on``);
 - pools: ``view`` and its parts ``left``, ``ahead``, ``right``, ``near``; ``here`` (things that lie
   where the agent searched); ``shut`` (closed things in view); ``visited`` (searched in vain);
-  ``plan``; after looking around ``to_right``, ``behind``, ``to_left``;
+  ``plan``; ``recalled`` (what is sought, if it was seen before and is not in view); after looking
+  around ``to_right``, ``behind``, ``to_left``;
 - flags: ``again`` (the place was searched before), ``lies_there`` and ``on_last`` (what is sought
   is seen to lie at the decision's object, at the last action's), ``elsewhere`` (the decision is not
   about the thing itself), ``holds_thing``, ``many`` (more than one place was searched in vain),
-  ``typical`` (people often keep such a thing at the decision's object), ``far_fetched`` (they
-  hardly do), ``unseen`` (what is sought is not in view), ``several`` (the task has several parts),
-  ``second`` (one of them is done), ``earned`` (the last action did a key action), ``told`` (it has
-  been said where what is sought is), ``next_part`` (one of them has just been done, and another
-  begins), ``first``, ``final`` (of this turn's thoughts), and the purpose and the outcome, as
-  ``is_search``.
+  ``typical`` (people often keep such a thing at the decision's object, which was not found to hold
+  something else), ``far_fetched`` (they hardly do), ``lay_there`` (what is recalled lay at the
+  decision's object), ``near_only`` (it does not, nor is it the thing itself), ``long_search``
+  (several places were searched for what is held), ``unseen`` (what is sought is not in view),
+  ``several`` (the task has several parts), ``second`` (one of them
+  is done), ``earned`` (the last action did a key action), ``told`` (it has been said where what is
+  sought is), ``next_part`` (one of them has just been done, and another begins), ``first``,
+  ``final`` (of this turn's thoughts), and the purpose and the outcome, as ``is_search``.
 """
 
 from __future__ import annotations
@@ -42,7 +46,7 @@ from er_gym.data.knowledge import Knowledge
 from er_gym.data.mentions import named_in
 from er_gym.data.trajectory import SeenObject
 from er_gym.tasks import verbs
-from er_gym.tasks.equivalence import same_type
+from er_gym.tasks.equivalence import is_among, same_type
 from er_gym.thor import OBJECT_TYPES
 
 HERE, NEAR, FAR = 0.35, 1.3, 3.0
@@ -62,6 +66,8 @@ _STANDING = frozenset(
 """Types that stand on others, though they cannot be picked up."""
 
 
+_LONG = 2
+"""So many searches in vain make a search long."""
 _UNNOTICED = frozenset({"Book", "Box", "Laptop", "Blinds"})
 """Types of which nobody says that they are open or closed."""
 
@@ -82,6 +88,9 @@ def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
     purpose: str = knowledge.purpose
     if purpose == "search" and (decision.object_type == sought or lies_on):
         purpose = "approach"  # nobody searches for what is in view
+    recalled = view["sought_memory"]
+    if purpose == "approach" and recalled:
+        purpose = "recall"
     facts: dict[str, Any] = {
         "purpose": purpose,
         "verb": decision.verb,
@@ -102,6 +111,8 @@ def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
         "many": len(visited) > 1,
         "again": decision.object_type in [visit.place for visit in knowledge.visits],
         "lies_there": bool(lies_on) and same_type(lies_on, decision.object_type),
+        "recalled": (recalled,) if recalled else (),
+        "lay_there": bool(recalled) and _is_at(recalled, decision.object_type),
         "on_last": last is not None
         and bool(lies_on)
         and same_type(lies_on, last.action.object_type),
@@ -112,7 +123,9 @@ def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
     }
     if thing and decision.object_type in OBJECT_TYPES and thing in search_priors.placement_table():
         likelihood = search_priors.likelihood(thing, decision.object_type)
-        facts["typical"] = likelihood >= _TYPICAL and decision.object_type != "GarbageCan"
+        usual = likelihood >= _TYPICAL and decision.object_type != "GarbageCan"
+        holds = [on for kind, on in knowledge.lay.items() if not same_type(kind, thing)]
+        facts["typical"] = usual and not is_among(decision.object_type, (*holds, *visited))
         facts["far_fetched"] = likelihood < _UNUSUAL
     facts["earned"] = last is not None and last.earned
     facts["told"] = outcome in _TELLING
@@ -120,6 +133,8 @@ def facts_of(knowledge: Knowledge, choices: random.Random) -> dict[str, Any]:
     facts[f"is_{purpose}"] = True
     facts["holds_thing"] = bool(thing) and thing == knowledge.held
     facts["elsewhere"] = decision.object_type not in ("", thing)
+    known = facts["lies_there"] or facts["lay_there"] or decision.object_type == sought
+    facts["near_only"] = bool(sought) and not known
     return {name: value for name, value in facts.items() if value}
 
 
@@ -130,14 +145,16 @@ def _story(knowledge: Knowledge, thing: str) -> dict[str, Any]:
     toggled = False
     latest = ""
     closing = "empty"
+    in_vain = 0
     for each in knowledge.actions:
         if not each.success:
             continue
         verb = each.action.verb
+        in_vain += each.purpose in ("search", "look around") and not each.earned
         if verb == verbs.PICKUP:
             held, closing = each.action.object_type, "taken"
         elif verb == verbs.PUT and held:
-            latest, closing = held, "placed"
+            latest, closing, in_vain = held, "placed", 0
             if each.earned:
                 puts.append((_known(held), _known(each.action.object_type)))
         elif verb == verbs.TOGGLE:
@@ -153,6 +170,7 @@ def _story(knowledge: Knowledge, thing: str) -> dict[str, Any]:
         "second": several and begins,
         "next_part": several and begins and put_now,
         "closing": closing,
+        "long_search": in_vain >= _LONG,
         "ended": _ended(knowledge, thing, puts, toggled),
     }
     others = [pair for pair in puts if pair[0] != subgoal.thing]
@@ -176,6 +194,10 @@ def _ended(knowledge: Knowledge, thing: str, puts: Sequence[tuple[str, str]], to
     if verb == verbs.TOGGLE and toggled:
         return "toggle"
     return "find" if verb == "find" and thing in knowledge.in_view else ""
+
+
+def _is_at(memory: Mapping[str, Any], place: str) -> bool:
+    return any(kind and same_type(kind, place) for kind in (memory["o_on"], memory["o"]))
 
 
 def _is_carried(kind: str) -> bool:
@@ -223,7 +245,12 @@ def _in_view(knowledge: Knowledge, sought: str, choices: random.Random) -> dict[
     told = [each for kind, each in things.items() if kind not in known and _is_worth_a_word(each)]
     choices.shuffle(told)
     memory = {
-        kind: {"o": kind, "seen_at": _known(where) if where != kind else "", "at_start": not where}
+        kind: {
+            "o": kind,
+            "seen_at": _known(where) if where not in (kind, knowledge.lay.get(kind)) else "",
+            "at_start": not where,
+            "o_on": _known(knowledge.lay.get(kind, "")) if _lies(kind) else "",
+        }
         for kind, where in knowledge.seen.items()
         if kind not in everywhere and kind != knowledge.held and kind in OBJECT_TYPES
     }

@@ -34,6 +34,7 @@ Facts: TypeAlias = Mapping[str, Any]
 """A fact is an object type or another text, a flag, the facts of one thing, or a pool: a tuple of
 such."""
 _TOKEN = re.compile(r"[\[|\]]|\{[^{}]*\}|[^\[|\]{}]+")
+_SENTENCE_END = re.compile(r"[.?!。？！]")
 _MOST_LISTED = 3
 
 
@@ -75,6 +76,8 @@ class _Text:
     text: str
 
     def write(self, writing: Writing, facts: Facts) -> str:
+        if _SENTENCE_END.search(self.text):
+            writing.nouns.end_sentence()
         return self.text
 
 
@@ -127,14 +130,15 @@ class _List:
         chosen = fresh[:most]
         writing.mentioned.update(each["o"] for each in chosen)
         nouns = writing.nouns
-        return nouns.joined(
-            [
-                nouns.counted(each, writing.random)
-                if self.form == "a"
-                else nouns.word(each["o"], self.form, writing.random)
-                for each in chosen
-            ]
-        )
+        words = [
+            nouns.counted(each, writing.random)
+            if self.form == "a"
+            else nouns.word(each["o"], self.form, writing.random)
+            for each in chosen
+        ]
+        if len(words) > 1:
+            nouns.end_list()
+        return nouns.joined(words)
 
 
 @dataclass(frozen=True)
@@ -195,11 +199,12 @@ class Rule:
             order.sort(key=lambda line: (line.is_last_resort, id(line) in writing.used))
         for line in order:
             mentioned, nouns = set(writing.mentioned), writing.nouns
-            latest, earlier = nouns.latest, nouns.earlier
+            mark = nouns.mark()
             try:
                 text = line.write(writing, facts)
             except Missing:
-                writing.mentioned, nouns.latest, nouns.earlier = mentioned, latest, earlier
+                writing.mentioned = mentioned
+                nouns.go_back(mark)
                 continue
             writing.used.add(id(line))
             return text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from agents.expert.writers.base import ThoughtRequest, WrittenThoughts
@@ -19,6 +19,12 @@ _SENTENCE = {
     "en": re.compile(r"(?<=[.!?])\"?\s+(?=[\"A-Z])"),
     "zh": re.compile(r"(?<=[。！？])"),
 }
+_CLAUSE = {
+    "en": re.compile(r"[.,;:?!]\s*|\s(?:so|because|since|and)\s"),
+    "zh": re.compile(r"[。，；：？！]"),
+}
+_REASON = {"en": 20, "zh": 6}
+"""Letters from which a clause says something of its own."""
 _WORD_START = re.compile(r"((?:^|[.!?]\s+)\"?)([a-z])")
 _HAN = re.compile(r"[一-鿿]")
 
@@ -40,13 +46,13 @@ class GroundedWriter:
         language = knowledge.language
         earlier = [thought.text for turn in knowledge.earlier for thought in turn]
         writing = Writing(grammar(language), nouns(language, "\n".join(earlier)), choices)
-        said = {sentence for text in earlier for sentence in sentences(text, language)}
+        said = {clause for text in earlier for clause in clauses(text, language)}
         thoughts = []
         for index, (kind, limit) in enumerate(zip(request.kinds, request.limits, strict=True)):
             place = {"first": index == 0, "final": index == len(request.kinds) - 1}
             place["told"] = index > 0 or facts.get("told", False)
             text = _fitting(writing, kind, {**facts, **place}, limit, language, said)
-            said.update(sentences(text, language))
+            said.update(clauses(text, language))
             thoughts.append(ThoughtRecord(kind=kind, text=text, writer=self.name))
         return WrittenThoughts(tuple(thoughts))
 
@@ -57,22 +63,26 @@ def _fitting(
     facts: dict[str, Any],
     limit: int,
     language: Language,
-    said: Iterable[str],
+    said: Collection[str],
 ) -> str:
     """A thought within the limit that, if possible, says nothing in the same words again."""
-    shortest = ""
+    shortest, best, least = "", "", 0
     before = set(writing.mentioned)
     for fullness in FULLNESS:
         writing.fullness = fullness
         writing.mentioned = set(before)
         writing.nouns.forget()
         text = polished(writing.write(kind, facts), language)
-        parts = sentences(text, language)
-        if length_in_words(text, language) <= limit and len({*parts} - {*said}) == len(parts):
-            return text
+        if length_in_words(text, language) <= limit:
+            parts = clauses(text, language)
+            again = len(parts) - len({*parts}.difference(said))
+            if not again:
+                return text
+            if not best or again < least:
+                best, least = text, again
         if not shortest or length_in_words(text, language) < length_in_words(shortest, language):
             shortest = text
-    return _cut(sentences(shortest, language), limit, language)
+    return best or _cut(sentences(shortest, language), limit, language)
 
 
 def _cut(parts: Sequence[str], limit: int, language: Language) -> str:
@@ -95,6 +105,13 @@ def polished(text: str, language: Language) -> str:
 def sentences(text: str, language: Language) -> list[str]:
     """The sentences of a text."""
     return [part.strip() for part in _SENTENCE[language].split(text) if part.strip()]
+
+
+def clauses(text: str, language: Language) -> list[str]:
+    """The sentences of a text, and its longer clauses in lower case, each once."""
+    parts = (part.strip().lower() for part in _CLAUSE[language].split(text))
+    long = (part for part in parts if len(part) >= _REASON[language])
+    return [*dict.fromkeys((*sentences(text, language), *long))]
 
 
 def length_in_words(text: str, language: Language) -> int:

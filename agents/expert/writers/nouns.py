@@ -30,23 +30,25 @@ class Nouns(ABC):
     Attributes:
         latest: the type mentioned last, ``""`` at the beginning of a text.
         earlier: the one mentioned before it.
+        subject: the type mentioned first in this sentence; until there is one, in the sentence
+            before. What is listed with others is none.
     """
 
     def __init__(self, names: Mapping[str, Sequence[str]], said: str = "") -> None:
         self._names = names
         self._said = said
         self._chosen: dict[str, str] = {}
-        self.latest = ""
-        self.earlier = ""
+        self.forget()
 
     def word(self, value: str, form: str, choices: random.Random) -> str:
         """A fact in a form; what is no object type stays as it is.
 
         Forms: ``""`` bare, ``the``, ``name`` (never a pronoun), ``a``, ``in`` with the preposition,
-        ``that`` a pronoun if the type was the last to be mentioned, else ``the``, and ``to``, the
-        way there. English also has ``into``, ``it``, ``they``, ``is``, ``was`` and ``s`` (the
-        plural), and ``the``, ``in`` and ``into`` are pronouns if the type was the last to be
-        mentioned.
+        ``that`` a pronoun if it is clear what is meant, else ``the``, and ``to``, the way there.
+        English also has ``those`` (``that`` as a subject), ``into``, ``it`` and ``they`` (pronouns
+        in any case), ``is``, ``was`` and ``s`` (the plural), and ``the``, ``in`` and ``into`` are
+        pronouns if that is clear. It is clear if the type was mentioned last, and first in its
+        sentence.
         """
         if value not in self._names:
             return value
@@ -56,18 +58,46 @@ class Nouns(ABC):
             drawn = first if usual else choices.choice(others)
             self._chosen[value] = self._kept(value) or drawn
         form = self._short(value, form) or form
-        if self.latest != value:
-            self.earlier, self.latest = self.latest, value
+        if form not in _NO_MENTION:
+            self._mention(value)
         return self._formed(value, self._chosen[value], form)
 
     def forget(self) -> None:
         """Begin a new text."""
-        self.latest = self.earlier = ""
+        self.latest = self.earlier = self.subject = ""
+        self._begins = False
+
+    def end_sentence(self) -> None:
+        """What comes next is another sentence."""
+        self._begins = True
+
+    def end_list(self) -> None:
+        """Several types were listed; no pronoun stands for one of them."""
+        self.latest = self.subject = ""
+
+    def mark(self) -> tuple[str, str, str, bool]:
+        """What has been mentioned so far, to :meth:`go_back` to."""
+        return self.latest, self.earlier, self.subject, self._begins
+
+    def go_back(self, mark: tuple[str, str, str, bool]) -> None:
+        """Take back what was mentioned since a mark."""
+        self.latest, self.earlier, self.subject, self._begins = mark
+
+    def _mention(self, value: str) -> None:
+        if self._begins or not self.latest:
+            self.subject = value
+        self._begins = False
+        if self.latest != value:
+            self.earlier, self.latest = self.latest, value
+
+    def _is_clear(self, value: str) -> bool:
+        """Whether a pronoun can mean nothing else."""
+        return self.latest == value == self.subject
 
     def _short(self, value: str, form: str) -> str:
         """The form of a pronoun where it is clear what is meant, else ``""``."""
         if form == "that":
-            return "it" if self.latest == value else "the"
+            return "it" if self._is_clear(value) else "the"
         if form == "to" and (self.latest == value or (self.earlier == value and self._is_carried)):
             return "there"
         return ""
@@ -75,7 +105,8 @@ class Nouns(ABC):
     @property
     def _is_carried(self) -> bool:
         """Whether the type mentioned last is no place that one could mean by "there"."""
-        return "pickupable" in OBJECT_TYPES[self.latest].properties
+        kind = OBJECT_TYPES.get(self.latest)
+        return kind is not None and "pickupable" in kind.properties
 
     def _kept(self, value: str) -> str:
         """The name that the type has in the earlier texts, the longest if there are several."""
@@ -101,6 +132,8 @@ class Nouns(ABC):
 
 
 _PRONOUNS = {"the": "it", "in": "in it", "into": "into it"}
+_NO_MENTION = frozenset({"is", "was"})
+"""Forms that do not name the type."""
 
 
 class EnglishNouns(Nouns):
@@ -110,7 +143,9 @@ class EnglishNouns(Nouns):
         return re.search(rf"\b{re.escape(name)}\b", self._said) is not None
 
     def _short(self, value: str, form: str) -> str:
-        if form in _PRONOUNS and self.latest == value and value not in PLURAL:
+        if form == "those":
+            return "they" if self._is_clear(value) else "name"
+        if form in _PRONOUNS and self._is_clear(value) and value not in PLURAL:
             return _PRONOUNS[form]
         return super()._short(value, form)
 

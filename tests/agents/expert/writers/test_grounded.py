@@ -240,7 +240,8 @@ def test_every_line_can_be_written(language: Language) -> None:
 
 LISTS = {"all", "some", "several"}
 FORMS: dict[str, set[str]] = {
-    "en": {"a", "in", "into", "is", "it", "name", "that", "the", "they", "to", "was"} | LISTS,
+    "en": {"a", "in", "into", "is", "it", "name", "that", "the", "they", "those", "to", "was"}
+    | LISTS,
     "zh": {"a", "in", "that", "to"} | LISTS,
 }
 """The lists of a pool, and the forms of :meth:`agents.expert.writers.nouns.Nouns.word`."""
