@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterator
 
 from er_gym.data import action_claims, claims, form
+from er_gym.data.clauses.judging import check_clauses
 from er_gym.data.knowledge import Knowledge
 from er_gym.data.thought import Refusal, Thought
 from er_gym.data.trajectory import ThoughtKind
@@ -30,15 +31,14 @@ CHECKS: tuple[Callable[[Thought], Iterator[Refusal]], ...] = (
     claims.check_unseen,
     claims.check_hidden,
     claims.check_inside,
-    claims.check_denied,
     claims.check_support,
     claims.check_side,
-    claims.check_count,
     claims.check_state,
     claims.check_hand,
     action_claims.check_history,
     action_claims.check_outcome,
     action_claims.check_decision,
+    check_clauses,
 )
 """Every check. Codes: ``length``, ``language``, ``tags``, ``leak``, ``repeat``, ``unseen``,
 ``hidden``, ``support``, ``side``, ``count``, ``state``, ``held``, ``history``, ``decision``."""

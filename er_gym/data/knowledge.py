@@ -66,6 +66,7 @@ class Knowledge:
         at: the type last navigated to, ``""`` at first.
         seen: every object type that is or was in view, with the place (the type last navigated to,
             ``""`` for the start) where it was in view last.
+        sightings: every such type, with all places from which it was in view, in order.
         visits: the places searched for the present subgoal, in order.
         navigable, interactable: the object types that are legal targets now.
         last: the last action; None at the first turn.
@@ -86,6 +87,7 @@ class Knowledge:
     subgoal: Subgoal
     views: Mapping[str, Sequence[SeenObject]] = field(default_factory=dict)
     seen: Mapping[str, str] = field(default_factory=dict)
+    sightings: Mapping[str, Sequence[str]] = field(default_factory=dict)
     visits: Sequence[Visit] = ()
     navigable: Sequence[str] = ()
     interactable: Sequence[str] = ()
@@ -114,10 +116,12 @@ def knowledge_at(
     """
     turn, before = turns[index], turns[:index]
     seen: dict[str, str] = {}
+    sightings: dict[str, dict[str, None]] = {}
     for each in (*before, turn):
         around = (one for view in each.views.values() for one in view)
         for one in (*each.view, *around):
             seen[one.type] = each.at
+            sightings.setdefault(one.type, {})[each.at] = None
     actions = [
         LastAction(
             action=each.action,
@@ -138,6 +142,7 @@ def knowledge_at(
         held=turn.held,
         at=turn.at,
         seen=seen,
+        sightings={name: tuple(places) for name, places in sightings.items()},
         visits=_visits(before, turn.subgoal),
         navigable=turn.navigable,
         interactable=turn.interactable,

@@ -32,7 +32,7 @@ NAMES_ZH: Mapping[str, tuple[str, ...]] = {
     "Cloth": ("抹布", "布", "擦布"),
     "CoffeeMachine": ("咖啡机",),
     "CoffeeTable": ("茶几", "咖啡桌"),
-    "CounterTop": ("台面", "厨房台面", "操作台", "料理台", "橱柜台面", "柜台", "灶台"),
+    "CounterTop": ("台面", "厨房台面", "操作台", "料理台", "橱柜台面", "柜台"),
     "CreditCard": ("信用卡", "银行卡", "卡"),
     "Cup": ("玻璃杯", "水杯", "杯"),
     "Curtains": ("窗帘",),

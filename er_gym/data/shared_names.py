@@ -15,6 +15,7 @@ _SHARED: tuple[tuple[str, str, str], ...] = (
     ("TableTopDecor RoomDecor", "decorative item/decoration/decor", "装饰品"),
     ("ShelvingUnit Shelf", "bookshelf/bookcase", "书架"),
     ("StoveBurner StoveKnob", "stove", "炉灶/炉子"),
+    ("StoveBurner CounterTop", "", "灶台"),
     ("TowelHolder HandTowelHolder", "towel rack/towel bar", "毛巾架"),
     ("Curtains ShowerCurtain", "curtain", ""),
     ("ShowerHead ShowerDoor ShowerCurtain", "shower", "淋浴"),

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.harness.judged_thoughts import HONEST, Judged, judge, load
 
-RECALL = 0.25
+RECALL = 0.8
 """The least share of lies that is refused."""
 
 
