@@ -3,9 +3,9 @@
     python -m benchmarks.checks.critic_recall tests/data/others/dev.json
 
 Each FILE is a list of thoughts about real scenes (``benchmarks.harness.judged_thoughts`` states the
-format). It prints recall by sort of lie and language, and the microseconds of
-CPU time a thought. The exit code is 1 if fewer lies are refused than ``--least`` or more honest
-thoughts than ``--most`` allow.
+format). It prints recall by sort of lie and language, the share of sentences of which no claim was
+judged, and the CPU time a thought. The exit code is 1 if fewer lies are refused than ``--least`` or
+more honest thoughts than ``--most`` allow.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from pathlib import Path
 import click
 
 from benchmarks.harness.judged_thoughts import HONEST, LIMIT, Judged, judge, load
+from er_gym.data.clauses.judging import unknown_sentences
 from er_gym.data.critic import check
+from er_gym.data.thought import Thought
 
 _LANGUAGES = ("en", "zh")
 _ROUNDS = 5
@@ -47,6 +49,15 @@ def _rows(judged: Iterable[Judged]) -> Iterator[str]:
         yield f"{sort:<32}{cells[0]:>12}{cells[1]:>12}{whole:>14}"
 
 
+def _unknown(judged: Sequence[Judged]) -> float:
+    """The share of sentences of which the critic judged nothing."""
+    counts = [
+        unknown_sentences(Thought(each.written.text, "reasoning", LIMIT, each.known))
+        for each in judged
+    ]
+    return sum(unknown for unknown, _ in counts) / max(1, sum(every for _, every in counts))
+
+
 def _microseconds(judged: Sequence[Judged]) -> float:
     """CPU time a thought, in microseconds."""
     began = time.process_time()
@@ -72,6 +83,7 @@ def main(files: Sequence[Path], least: float, most: float, wrong: bool) -> None:
                 why = "; ".join(f"{refusal.code}: {refusal.detail}" for refusal in each.refusals)
                 click.echo(f"{one.scene} {one.sort}: {one.text} {why}")
     click.echo("\n".join(_rows(judged)))
+    click.echo(f"sentences of which no claim was judged: {_unknown(judged):.0%}")
     click.echo(f"CPU microseconds a thought: {_microseconds(judged):.0f}")
     lies = share([each for each in judged if each.written.sort != HONEST])
     honest = share([each for each in judged if each.written.sort == HONEST])

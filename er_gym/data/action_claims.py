@@ -151,11 +151,11 @@ def _hangs_on_another(thought: Thought, clause: Clause) -> bool:
 def check_decision(thought: Thought) -> Iterator[Refusal]:
     """Announces another action than the one that the turn takes."""
     known, phrases = thought.known, thought.phrases
-    decided = [each for each in _decided(thought) if each.act != "look around" or each.clause.last]
-    fitting = [each for each in decided if _fits(thought, each)]
-    others = [each for each in decided if each not in fitting and not each.later]
+    those = [each for each in decided(thought) if each.act != "look around" or each.clause.last]
+    fitting = [each for each in those if _fits(thought, each)]
+    others = [each for each in those if each not in fitting and not each.later]
     wrong = None
-    if decided and not fitting:
+    if those and not fitting:
         strong = [each for each in others if not each.weak]
         wrong = strong[-1] if strong else next((each for each in others if each.clause.last), None)
     elif others:
@@ -163,7 +163,7 @@ def check_decision(thought: Thought) -> Iterator[Refusal]:
         replaced = [
             each
             for each in others
-            if each is decided[-1] and phrases.instead.search(each.clause.text)
+            if each is those[-1] and phrases.instead.search(each.clause.text)
         ]
         wrong = next(iter((*first, *replaced)), None)
     if wrong is not None:
@@ -183,7 +183,7 @@ def check_decision(thought: Thought) -> Iterator[Refusal]:
                 )
 
 
-def _decided(thought: Thought) -> Iterator[Decided]:
+def decided(thought: Thought) -> Iterator[Decided]:
     """All actions that a thought decides on, in order."""
     phrases = thought.phrases
     for clause in thought.clauses:

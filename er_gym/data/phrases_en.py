@@ -95,10 +95,10 @@ PHRASES = Phrases(
         _word(
             "may/might/could(?! not)/perhaps/maybe/possibly/probably/likely/likeliest/likelier/presumably"
             "/potentially/possible/plausible/plausibly/conceivably/suppose/guess/assume/suspect"
-            "/expect/expected/imagine/wonder/wondering/hoped/had hoped/thought/can picture/i picture/picturing/chance/chances/hope/hoping/hopefully/bet"
+            "/expect/expected/imagine/wonder/wondering/hoped/had hoped/(?<!a )(?<!no )thought/can picture/i picture/picturing/chance/chances/hope/hoping/hopefully/bet"
             "/should be/must be/must have/should have/ought to/seems/seem/appears to be/as if/as though"
             "/supposedly/apparently/unclear/unsure/not sure/uncertain/cannot tell/can't tell"
-            "/would/i think/i believe/i'd/or/either/no idea/unless"
+            "/would/i think/i believe/i'd(?! (?:[a-z]+ed|gone|been|taken|seen|put|shut|left|had|got|come|found|already|just|even)\b)/or/either/no idea/unless"
             "/whether/reckon/apt/doubt/odds/likelihood/looks like/look like/resembles"
         ),
     ),
@@ -108,8 +108,8 @@ PHRASES = Phrases(
         r"|n't\b|n’t\b"
     ),
     condition=_any(
-        r"\b(?:if|unless|in case|once|until|as soon as|otherwise|before(?= [a-z])|provided|suppose|assuming"
-        r"|even when|whenever|wherever|would have|in order to|so as to)\b|\bwhen (?!i (?:opened|looked|went|got|arrived|came))"
+        r"\b(?:if|unless|in case|(?<!at )once(?! (?:before|already|more|again)\b|[,.;]|$)|until|as soon as|otherwise|before(?= [a-z])(?! (?:anything|everything|me|that|this|now|us|long)\b| (?:i|we) (?:[a-z]+ed|left|went|took|came|got|had|ever)\b| i'd\b)|provided|suppose|assuming"
+        r"|even when|whenever|wherever|would have|in order to|so as to)\b|\bwhen (?!i (?:[a-z]+ed|was|stood|saw|went|got|came|took|had)\b)"
     ),
     goal=_any(
         r"\b(?:need(?:s|ed)?|have to|has to|look(?:ing)? for|search(?:ing|es|ed)? for|search of|hunt(?:ing)?"
@@ -126,7 +126,7 @@ PHRASES = Phrases(
         r"|makes sense|logical|reasonable|makes? (?:a|it) good|is where (?:people|one|you)|are (?:usually )?(?:kept|stored))\b"
     ),
     past=re.compile(
-        r"\b(?:was|were|had|earlier|before|previously|remember|recall|at the start|from the start"
+        r"\b(?:was|were|had|earlier|before(?! (?:me|us)\b)|previously|remember|recall|at the start|from the start"
         r"|at first|used to|initially|a moment ago)\b"
     ),
     intention=_any(
@@ -299,6 +299,7 @@ PHRASES = Phrases(
         r"\bmade up my mind to\b|\blet me\b|\blet's\b|\blet us\b|\btime to\b|\bready to\b",
         r"\b(?:next|best|right|obvious|logical|sensible|first|immediate|remaining|only) (?:step|move|thing|action|option|choice|place|idea|course)[^.,§]{0,40}? (?:is|will be)(?: now)?(?: to)?\b",
         r"\bmakes? (?:the most |more |good |perfect )?sense to\b|\bmy (?:plan|decision|choice) is(?: now)? to\b|\bdecision is to\b|\bdecided(?: to|:)",
+        r"\b(?:is|are) (?:what|where|the one) i(?:'ll| will|'m going to)(?= (?:open|go|take|head|close|pick|visit|try|check) )",
         r"\b(?:so|now|therefore|thus|hence|next|then|accordingly),? i(?= )",
         r"\bi'm(?= (?:now )?(?:off|on my way|headed) to\b)",
         r"^i(?= (?:now |therefore |simply |then )?(?:go|head|walk|open|close|shut|pick|take|grab|place|switch|toggle|navigate|return|approach)\b)",

@@ -32,6 +32,7 @@ _SHARED: tuple[tuple[str, str, str], ...] = (
     ("Dresser Safe", "chest", ""),
     ("DiningTable CoffeeTable SideTable Desk", "", "桌子"),
     ("TissueBox PaperTowelRoll", "", "纸巾"),
+    ("ToiletPaper PaperTowelRoll", "roll", "纸卷"),
     ("SinkBasin Sink", "", "水池"),
     ("Pot Pan", "", "锅"),
     ("Spoon Ladle", "", "勺"),

@@ -1,7 +1,7 @@
 """The word classes of one language, from which clauses are read.
 
-:mod:`er_gym.data.clauses.lexicon_en` and :mod:`er_gym.data.clauses.lexicon_zh` fill it. Texts are in
-lower case, with a :data:`~er_gym.data.phrases.MARK` for each name of an object.
+:mod:`er_gym.data.clauses.lexicon_en` and :mod:`er_gym.data.clauses.lexicon_zh` fill it. Texts are
+in lower case, with a :data:`~er_gym.data.phrases.MARK` for each name of an object.
 """
 
 from __future__ import annotations

@@ -105,9 +105,9 @@ LEXICON = Lexicon(
     denied_deeds={},
     undone=re.compile(r"\b(?:never|not|nothing|without|neither|nor|none|no|cannot|yet to|rather than|instead of|failed|unable|tried to|meant to|wanted to)\b|n't\b"),
     nothing={
-        verbs.OPEN: re.compile(r"\b(?:not|n't|never|yet to)(?: (?:yet|even|actually|ever|so far))* (?:opened?) (?:a (?:single )?thing|anything|any (?:of (?:the|these) )?(?:container|door|thing)s?|one thing)\b|\bopened (?:nothing|not a thing)\b|\bnothing(?: at all)? (?:has been|was|is) opened\b|\bwithout (?:ever |once )?opening anything\b"),
-        verbs.PICKUP: re.compile(r"\b(?:not|n't|never|yet to)(?: (?:yet|even|actually|ever|so far))* (?:picked up|taken|touched|pick up|take|grabbed) (?:a (?:single )?thing|anything|any (?:item|object)s?)\b|\b(?:picked up|taken|grabbed) (?:nothing|not a thing)\b|\bpicked nothing up\b|\bnothing(?: at all)? (?:has been|was) (?:picked up|taken)\b"),
-        verbs.NAVIGATE: re.compile(r"\b(?:not|n't|never|yet to)(?: (?:yet|even|actually|ever|so far))* (?:moved|gone anywhere|left (?:the )?(?:start|spot|my spot|where i (?:started|began))|budged|taken a (?:single )?step|gone to (?:any|a single) (?:place|thing))\b|\bnot moved (?:an inch|at all)\b"),
+        verbs.OPEN: re.compile(r"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|even|actually|ever|so far))* (?:opened?) (?:a (?:single )?thing|anything|any (?:of (?:the|these) )?(?:container|door|thing)s?|one thing)\b|\bopened (?:nothing|not a thing)\b|\bnothing(?: at all)? (?:has been|was|is) opened\b|\bwithout (?:ever |once )?opening anything\b"),
+        verbs.PICKUP: re.compile(r"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|even|actually|ever|so far))* (?:picked up|taken|touched|pick up|take|grabbed) (?:a (?:single )?thing|anything|any (?:item|object)s?)\b|\b(?:picked up|taken|grabbed) (?:nothing|not a thing)\b|\bpicked nothing up\b|\bnothing(?: at all)? (?:has been|was) (?:picked up|taken)\b"),
+        verbs.NAVIGATE: re.compile(r"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|even|actually|ever|so far))* (?:moved|gone anywhere|left (?:the )?(?:start|spot|my spot|where i (?:started|began))|budged|taken a (?:single )?step|gone to (?:any|a single) (?:place|thing))\b|\bnot moved (?:an inch|at all)\b"),
     },
     plain_verbs={
         verbs.OPEN: re.compile(r"\b(?:open(?:ed|ing)?|pull(?:ed|ing)|lift(?:ed|ing)?|raising)\b"),
@@ -174,7 +174,7 @@ LEXICON = Lexicon(
         re.compile(rf"{_X} was left (?:on|in|inside|over|atop|on top of) {_D}{_Y}"),
     ),
     never_seen=(
-        re.compile(rf"\b(?:not|n't|never|yet to)(?: (?:yet|once|even|ever|actually|so far|already))* (?:seen|laid eyes on|set eyes on|come across|spotted|noticed|sighted|encountered|glimpsed|caught sight of|lay eyes on|see|had sight of|run into|met)(?: (?:a|any|either|sign|trace|of|single|so|much|as|an?))* {_D}{_X}"),
+        re.compile(rf"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|once|even|ever|actually|so far|already))* (?:seen|laid eyes on|set eyes on|come across|spotted|noticed|sighted|encountered|glimpsed|caught sight of|lay eyes on|see|had sight of|run into|met)(?: (?:a|any|either|sign|trace|of|single|so|much|as|an?))* {_D}{_X}"),
         re.compile(rf"{_X} (?:has|had|have|'s)(?: (?:still|so far|yet|simply))*(?:n't| not| never| yet)(?: (?:yet|so far|once|ever|even))* (?:to )?(?:shown?(?: (?:itself|up|its face|themselves))?|turned up|appeared|crossed my path|come into (?:view|sight)|surfaced|been (?:seen|spotted|sighted|in view|in sight)|emerged|come up|caught my eye|revealed itself|made an appearance|popped up|met my eyes?)"),
         re.compile(rf"\bno {_D}{_X} (?:has|had|have)(?: (?:yet|so far|ever))* (?:shown (?:itself|up)|turned up|appeared|crossed my path|come into (?:view|sight)|surfaced|been (?:seen|spotted|sighted)|caught my eye|emerged)"),
         re.compile(rf"{_X},? (?:which |that |whom )?i(?:'ve| have) (?:not|never|yet to|n't)(?: (?:yet|once|even|ever|so far|actually))* (?:seen|laid eyes on|come across|spotted|noticed|encountered|set eyes on|see)"),
