@@ -51,6 +51,8 @@ def judge_deeds(thought: Thought) -> Iterator[Verdict]:
                 begin = max(0, match.start() - _BEFORE)
                 denied = lexicon.undone.search(clause.text, begin, match.end())
                 yield from _deed(thought, clause.sentence, verb, mention, bool(denied), match)
+                if not denied and not clause.negated and lexicon.first_try.search(clause.text):
+                    yield from _first_try(thought, clause.sentence, verb, mention)
         for verb, phrases in lexicon.denied_deeds.items():
             for match in span.matches(phrases):
                 mention = span.named(match, "x")
@@ -83,9 +85,10 @@ def _deed(
     done = thought.done(act, mention.types) and not (
         act == verbs.PICKUP and _failed(thought, act, mention)
     )
-    several = sum(1 for _ in thought.things(mention.types)) > 1
+    # Places are gone to by their type; whatever else is done is done to one of several.
+    several = act != verbs.NAVIGATE and sum(1 for _ in thought.things(mention.types)) > 1
     some = _OF_SOME.match(match.string, match.end())
-    if done and not some and (not several or _OF_ANY.search(match.group())):
+    if done and not some and not lexicon_of(thought).another.search(match.group()) and (not several or _OF_ANY.search(match.group())):
         yield Verdict(
             sentence,
             Refusal(
@@ -93,6 +96,19 @@ def _deed(
                 f"The agent did {PAST_VERB[act]} {name_of(mention)} before; do not deny it.",
             ),
         )
+
+
+def _first_try(thought: Thought, sentence: int, verb: str, mention: Mention) -> Iterator[Verdict]:
+    """It succeeded at once, unless it failed first."""
+    wanted = all_interchangeable(mention.types)
+    tries = [
+        each.success
+        for each in thought.known.actions
+        if each.action.verb == verb and each.action.object_type in wanted
+    ]
+    if True in tries and False in tries[: tries.index(True)]:
+        detail = f"The first attempt to {PAST_VERB[verb]} {name_of(mention)} failed."
+        yield Verdict(sentence, Refusal("history", detail))
 
 
 def _as_opening(verb: str, mention: Mention) -> str:

@@ -21,6 +21,7 @@ class Lexicon:
         deeds: what the agent has done, by verb (``searched`` is one), with its object: group ``x``,
             or ``y`` for where something was put. Not to be said of somebody else.
         denied_deeds: what the agent has not done, by verb, with its object ``x``.
+        first_try: a deed succeeded at once.
         undone: before or in a deed: it was not done.
         nothing: what denies deeds of a kind altogether, by verb.
         plain_verbs: the words for a verb in any form, by verb.
@@ -66,6 +67,7 @@ class Lexicon:
 
     deeds: Mapping[str, Sequence[Words]]
     denied_deeds: Mapping[str, Sequence[Words]]
+    first_try: Words
     undone: Words
     nothing: Mapping[str, Words]
     plain_verbs: Mapping[str, Words]

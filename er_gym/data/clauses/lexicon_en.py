@@ -79,6 +79,8 @@ LEXICON = Lexicon(
             *_deed(_TOOK, "picking up|taking|grabbing|fetching|collecting|retrieving", "picked up|taken|grabbed|collected|fetched|retrieved"),
             re.compile(rf"(?:{_DONE}) (?:picked|took|taken|lifted|picking|pick) {_D}{_X}(?: right)? (?:up|away|out|along|with me)\b"),
             re.compile(r"\b(?:managed|was able|did manage) to (?:pick up|take|grab|get hold of|get|fetch|collect) " + _D + _X),
+            re.compile(rf"\b(?:grabbing|taking|picking up|getting|fetching|lifting|collecting) (?:hold of )?{_D}{_X} (?:was (?:easy|simple|no (?:trouble|problem|effort)|effortless|a breeze|quick|straightforward|a success)|worked(?! out badly)|went (?:well|fine|smoothly|through|off)|succeeded|posed no)"),
+            re.compile(rf"\bsucceeded in (?:grabbing|taking|picking up|getting|fetching|lifting|collecting) (?:hold of )?{_D}{_X}"),
             re.compile(rf"\bi did (?:pick up|take|grab|get|fetch|collect) {_D}{_X}"),
             re.compile(rf"{_X} came (?:along|away|up|off)\b[^,.]{{0,40}}(?:when|as) i (?:grabbed|took|pulled|reached|picked)"),
             re.compile(rf"\b(?:grab|attempt|try|reach|lunge) (?:at|for) {_D}{_X} (?:went|worked|succeeded|paid off|was a success|came off)(?! wrong| nowhere| out)"),
@@ -102,7 +104,19 @@ LEXICON = Lexicon(
             re.compile(rf"\bmy (?:search|inspection|check) of {_D}{_X}"),
         ),
     },
-    denied_deeds={},
+    denied_deeds={
+        verb: (
+            re.compile(rf"\b(?:i|we) (?:did not|didn't|never did|did never)(?: (?:ever|even|once|actually|yet))* (?:{words}) {_D}{_OF}{_X}"),
+        )
+        for verb, words in (
+            (verbs.OPEN, "open|pull open"),
+            (verbs.CLOSE, "close|shut"),
+            (verbs.PICKUP, "pick up|take|grab|touch|collect|fetch"),
+            (verbs.NAVIGATE, "(?:go|get|come|walk|move|travel|head)(?: over| back| up)?(?: anywhere near| near| to| by)|visit|approach|reach"),
+            ("searched", "(?:look|peek|peer)(?: into| in| inside| through)|search|check|inspect|examine"),
+        )
+    },
+    first_try=re.compile(r"\b(?:at|on|with) (?:the|my) (?:very )?first (?:try|attempt|go|grab|shot)|\bfirst time round|\bfirst (?:try|attempt|grab) (?:worked|succeeded|went)|\b(?:straight off|in one go|at once|without a hitch)\b"),
     undone=re.compile(r"\b(?:never|not|nothing|without|neither|nor|none|no|cannot|yet to|rather than|instead of|failed|unable|tried to|meant to|wanted to)\b|n't\b"),
     nothing={
         verbs.OPEN: re.compile(r"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|even|actually|ever|so far))* (?:opened?) (?:a (?:single )?thing|anything|any (?:of (?:the|these) )?(?:container|door|thing)s?|one thing)\b|\bopened (?:nothing|not a thing)\b|\bnothing(?: at all)? (?:has been|was|is) opened\b|\bwithout (?:ever |once )?opening anything\b"),
@@ -128,7 +142,7 @@ LEXICON = Lexicon(
         re.compile(r"\bonly (?:once|after|when) (?P<a>[^.;,]{0,90}?§[^.;,]{0,90}?),? did i (?P<b>[^.;,]{0,90}?§)"),
     ),
     planned=re.compile(r"\b(?:will|'ll|let|going to|shall|should|need|must|could|would|can|may|might|want|plan|if|if i|until|to do|i'm|i am|had i|hadn't|next step)\b"),
-    told=re.compile(r"\b(?:told(?! to\b)|system|message|feedback|remark|reply|replied|response|reported|complain(?:ed|t)|came back (?:as|with)|was (?:turned down|refused|rejected|denied)|refused (?:to|when|my)|notice (?:said|read)|notified|informed|according to|error said|it said|they said)\b"),
+    told=re.compile(r"\b(?:told(?! to\b)|system|message|feedback|remark|reply|replied|response|reported|complain(?:ed|t)|came back (?:as|with)|was (?:turned down|refused|rejected|denied)|refused (?:to|when|my)|notice (?:said|read)|notified|informed|according to|warned|advised|error said|it said|they said)\b"),
     answers={
         "full hand": re.compile(r"\b(?:hands?|arms?|grip|gripper) (?:was|were|is|are|being|already|had been)?\s*(?:already )?(?:full|occupied|busy|taken)|full hands?|already (?:held|holding|carrying|hold)|too (?:much|many)(?: things)? in my hands?"),
         "empty hand": re.compile(r"\b(?:hands?|grip|gripper) (?:was|were|is|are) empty|nothing in my hand"),
@@ -138,9 +152,10 @@ LEXICON = Lexicon(
         "no action": re.compile(r"\bno (?:such )?(?:valid |known )?action|names? no action|not (?:a|an) (?:valid |known )?action|(?:doesn't|does not|didn't|did not|not) (?:know|recogni[sz]e|understand)"),
         "done": re.compile(r"\bdone\b(?! with)|\b(?:success|succeeded|successful|all (?:was )?(?:well|fine|right)|went (?:fine|well|through|smoothly)|confirmed)\b"),
     },
-    task=re.compile(r"\b(?:(?:was|am|been|i'm|being) (?:only |specifically |explicitly )?(?:asked|told|instructed|ordered|requested|sent)(?: here)? (?:to|for)|(?:task|job|instruction|instructions|request|order|errand|mission|assignment|brief)(?: (?:is|was|says|said|wants me|tells me|told me|asks me|requires me|demands|calls for|only says)| here is)*(?: to| for| that)?(?= (?!done|over|complete|finished))|(?:is|are) (?:supposed|meant) to(?! be (?:in|on|at|here|there|under|inside))(?: be)?|they (?:want|asked)(?: me)?(?: to)?|asked me to|wants me to)"),
+    task=re.compile(r"\b(?:(?:was|am|been|i'm|i've been|being) (?:only |specifically |explicitly )?(?:asked|told|instructed|ordered|requested|sent)(?: here)? (?:to|for)|(?:task|job|instruction|instructions|request|order|errand|mission|assignment|brief)(?: (?:is|was|says|said|wants me|tells me|told me|asks me|requires me|demands|calls for|only says)| here is)*(?: to| for| that)?(?= (?!done|over|complete|finished))|(?:is|are) (?:supposed|meant) to(?! be (?:in|on|at|here|there|under|inside))(?: be)?|they (?:want|asked)(?: me)?(?: to)?|asked me to|wants me to)"),
     chores={
-        "heat": (re.compile(r"\b(?:heat(?:ed|ing)?|warm(?:ed|ing)?|cook(?:ed|ing)?|boil(?:ed)?|fry|fried|toast(?:ed)?|bake[d]?|roast(?:ed)?|microwaved)\b"), re.compile(r"heat|warm|cook|boil|fry|toast|bake|roast|microwave|hot|热|煮|烤|煎|加热", re.I)),
+        "heat": (re.compile(r"\b(?:heat(?:ed|ing)?|warm(?:ed|ing)?|cook(?:ed|ing)?|boil(?:ed)?|fry|fried|toast(?:ed)?|bake[d]?|roast(?:ed)?|microwaved)\b"), re.compile(r"heat|warm|cook|boil|fry|toast|bake|roast|\bhot\b|热|煮|烤|煎|加热", re.I)),
+        "use": (re.compile(r"\b(?:play|read|eat|drink|watch|charge|fold|repair|fix|paint|feed|water|iron|decorate|serve|sharpen|unplug|plug in|measure|count|photograph|smell|taste)\b"), re.compile(r"play|read\b|eat|drink|watch|charg|fold|repair|fix|paint|feed|water|iron|decorat|serv|sharpen|plug|measur|count", re.I)),
         "wash": (re.compile(r"\b(?:wash(?:ed|ing)?|clean(?:ed|ing)?|rins(?:e|ed|ing)|scrub(?:bed)?|wipe[d]?|polish(?:ed)?)\b"), re.compile(r"wash|clean|rins|scrub|wipe|dirty|water|洗|清|擦", re.I)),
         "slice": (re.compile(r"\b(?:slic(?:e|ed|ing)|cut(?:ting)?|chop(?:ped)?|peel(?:ed)?)\b"), re.compile(r"slic|cut|chop|切", re.I)),
         "close": (re.compile(r"\b(?:clos(?:e|ed|ing)|shut(?:ting)?)\b"), re.compile(r"clos|shut|关|合", re.I)),
@@ -165,6 +180,7 @@ LEXICON = Lexicon(
     poured=re.compile(rf"\bwater(?: is| was|'s)?(?: (?:already|still|now|just|happily|merrily|even))* (?:runs?|running|gush(?:es|ing)|flow(?:s|ing)|pour(?:s|ing)|drip(?:s|ping)|splash(?:es|ing)|stream(?:s|ing)|trickl(?:es|ing)|comes|coming)\b[^,.;]{{0,40}}?(?:from|out of|at) {_D}{_X}"),
     held=(
         re.compile(rf"{_X}(?:,? (?:is|are)|'s)?(?: (?:now|still|already|firmly|safely|securely|sitting|resting|lying|nestled|snug|snugly|clutched|tucked|held|tight|gripped|right|here|there|clasped))* (?:in|within|between|under) my (?:(?:left|right|own|other) )?(?:hands?|palms?|grip|grasp|gripper|fingers|fist|arms?|possession|clutches)\b"),
+        re.compile(rf"\b(?:what|the thing|the object|all) (?:that )?i(?:'m|'ve| am| have)?(?: (?:currently|now|actually|still))* (?:hold|holding|carry|carrying|got|have|clutching|gripping)(?: in my hand| with me| here)? is {_D}{_X}"),
         re.compile(rf"\b(?:i am|i'm|i)(?: (?:now|still|already|currently|also|finally|just|here))* (?:clutching|gripping|grasping|cradling|toting|hugging|lugging|clasping|clutch|grip|cradle)(?: on to| onto)? {_D}{_X}"),
         re.compile(rf"^(?:and |but |so |now |with )*(?:the |a |an |this |my )?{_X}(?: (?:safely|firmly|securely|already|now|finally))* in (?:hand|my (?:hand|grip|palm))(?=$|[,.;:])"),
     ),
@@ -179,6 +195,8 @@ LEXICON = Lexicon(
         re.compile(rf"\bno {_D}{_X} (?:has|had|have)(?: (?:yet|so far|ever))* (?:shown (?:itself|up)|turned up|appeared|crossed my path|come into (?:view|sight)|surfaced|been (?:seen|spotted|sighted)|caught my eye|emerged)"),
         re.compile(rf"{_X},? (?:which |that |whom )?i(?:'ve| have) (?:not|never|yet to|n't)(?: (?:yet|once|even|ever|so far|actually))* (?:seen|laid eyes on|come across|spotted|noticed|encountered|set eyes on|see)"),
         re.compile(rf"{_X},? (?:which |that )?i haven't(?: (?:yet|once|even|ever|so far|actually))* (?:seen|laid eyes on|come across|spotted|noticed|encountered|set eyes on|found)"),
+        re.compile(rf"\b(?:i have|i've)(?: (?:so far|yet|still))? (?:seen|spotted|come across|noticed) (?:no|nothing of(?: the| an?)?|no trace of(?: the| an?)?|neither hide nor hair of(?: the| an?)?) {_D}{_X}"),
+        re.compile(rf"\bdoubt (?:that )?(?:i've|i have) ever (?:seen|come across|spotted|noticed) {_D}{_X}"),
         re.compile(rf"{_X} (?:remains?|is still|is|stays?|has remained) (?:unseen|a mystery to my eyes)"),
     ),
     here_only=re.compile(r"\b(?:from here|here|now|in this view|in here|this time|at the moment|currently|right now|since|again|any ?more|up close|clearly|properly|lately|from this|in it|among them|on it|inside it)\b|\b(?:in|on|inside|at|near|by|under|from|behind) (?:the |this |that |any |my |a )?(?:[a-z]+ )?§"),
@@ -198,6 +216,8 @@ LEXICON = Lexicon(
         re.compile(rf"\bthere (?:isn't|is not|aren't|are not|is) (?:a|an|any|no|one) {_D}{_XS} (?:to be seen|in sight|in view|around|anywhere|here|visible|in this view)"),
         re.compile(rf"{_XS} (?:is|are|'s)(?:n't| not)? (?:nowhere (?:to be seen|in sight|in view|around)|out of (?:sight|view)|(?:in sight|in view|visible|to be seen|anywhere (?:in sight|to be seen|in view)|around here|missing from view))(?<!'s in view)"),
         re.compile(rf"\bcan't see {_D}{_XS}(?=$|[,.;!])"),
+        re.compile(rf"{_XS} (?:can't|cannot|can not) be (?:seen|made out|spotted|found|discerned)(?=$|[,.;!]| (?:from|anywhere|at all|here|right now|in this))"),
+        re.compile(rf"{_XS} (?:is|are|'s) nowhere to be found"),
     ),
     not_on=(
         re.compile(rf"\b(?:no|not a|not a single|without a|isn't a|is not a|isn't any|see no) {_D}{_X} (?:on|in|inside|on top of) {_D}{_Y}"),

@@ -14,6 +14,8 @@ from er_gym.thor import OBJECT_TYPES
 
 _NEAR_BY = 40
 """Letters after a claim in which what limits it stands."""
+_HERE = re.compile(r"here|in here")
+"""Of what was never seen, it means the room."""
 _KEEPS = frozenset({"Fridge", "Microwave", "Cabinet", "Drawer", "Safe", "Toilet", "Box"})
 """What keeps things out of sight while it is closed."""
 _START = "the start"
@@ -27,7 +29,8 @@ def judge_never_seen(thought: Thought) -> Iterator[Verdict]:
             mention = span.named(match, "x")
             rest = span.text[match.end() : match.end() + _NEAR_BY].split(",")[0].split("，")[0]
             inside = span.text[match.start() : match.end()]
-            if mention is None or lexicon.here_only.search(rest):
+            limit = lexicon.here_only.search(rest)
+            if mention is None or (limit and not _HERE.fullmatch(limit.group())):
                 continue
             if lexicon.another.search(inside):
                 continue
@@ -112,7 +115,15 @@ def judge_denials(thought: Thought) -> Iterator[Verdict]:
                 f"{clause.text[: match.start()]} {clause.text[match.end() :]}"
             ):
                 continue
+            sides = {
+                side
+                for side, phrase in thought.phrases.sides.items()
+                if phrase.search(clause.text)
+            }
             for mention in span.among(match.start("xs"), match.end("xs")):
+                there = {each.side for each in thought.known.view if each.type in mention.types}
+                if sides and not sides & there:
+                    continue
                 if mention.types <= thought.known.in_view:
                     yield Verdict(
                         span.sentence,
