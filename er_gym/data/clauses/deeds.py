@@ -88,7 +88,12 @@ def _deed(
     # Places are gone to by their type; whatever else is done is done to one of several.
     several = act != verbs.NAVIGATE and sum(1 for _ in thought.things(mention.types)) > 1
     some = _OF_SOME.match(match.string, match.end())
-    if done and not some and not lexicon_of(thought).another.search(match.group()) and (not several or _OF_ANY.search(match.group())):
+    if (
+        done
+        and not some
+        and not lexicon_of(thought).another.search(match.group())
+        and (not several or _OF_ANY.search(match.group()))
+    ):
         yield Verdict(
             sentence,
             Refusal(
@@ -142,13 +147,20 @@ _PAST = re.compile(
 )
 
 
+_SAYS_WHEN = re.compile(
+    r"\b(?:first|before|after|afterwards?|then|later|subsequently)\b|[先后]|之前|以前"
+)
+_LONGEST = 400
+"""Letters of a sentence of which the order of deeds is read; the time grows with their square."""
+
+
 def judge_order(thought: Thought) -> Iterator[Verdict]:
     """One deed came before another."""
     lexicon = lexicon_of(thought)
     if len(thought.known.actions) < 2:
         return
     for span in sentences_of(thought):
-        if len(span.mentions) < 2:
+        if len(span.mentions) < 2 or len(span.text) > _LONGEST or not _SAYS_WHEN.search(span.text):
             continue
         for match in span.matches(lexicon.order):
             parts = (match["a"], match["b"])

@@ -109,6 +109,8 @@ def judge_denials(thought: Thought) -> Iterator[Verdict]:
             continue
         if lexicon.another.search(clause.text) or _searches(thought, span):
             continue
+        if not clause.negated and "out of" not in clause.text:
+            continue
         for match in span.matches(lexicon.not_in_view):
             # "Not the mug or the apple" denies both, and guesses nothing.
             if thought.phrases.hedge.search(
@@ -116,9 +118,7 @@ def judge_denials(thought: Thought) -> Iterator[Verdict]:
             ):
                 continue
             sides = {
-                side
-                for side, phrase in thought.phrases.sides.items()
-                if phrase.search(clause.text)
+                side for side, phrase in thought.phrases.sides.items() if phrase.search(clause.text)
             }
             for mention in span.among(match.start("xs"), match.end("xs")):
                 there = {each.side for each in thought.known.view if each.type in mention.types}
