@@ -1,8 +1,9 @@
 """The critic: checks a thought against what the agent could know.
 
-It checks what a thought states as a fact; guesses, questions, plans and wishes state nothing. It
-accepts sentences that it cannot parse. So it does not refuse a true thought for its wording, but it
-also accepts a false one in a wording that it does not know.
+It checks what a thought states as a fact, and refuses guesses at what is in view or was seen; other
+guesses, questions, plans and wishes state nothing. It accepts sentences that it cannot parse. So it
+does not refuse a true thought for its wording, but it also accepts a false one in a wording that it
+does not know.
 """
 
 from __future__ import annotations
@@ -41,7 +42,8 @@ CHECKS: tuple[Callable[[Thought], Iterator[Refusal]], ...] = (
     check_clauses,
 )
 """Every check. Codes: ``length``, ``language``, ``tags``, ``leak``, ``repeat``, ``unseen``,
-``hidden``, ``support``, ``side``, ``count``, ``state``, ``held``, ``history``, ``decision``."""
+``hidden``, ``support``, ``side``, ``count``, ``state``, ``held``, ``history``, ``decision``,
+``memory``, ``distance``, ``room``, ``task``."""
 
 
 def check(text: str, kind: ThoughtKind, knowledge: Knowledge, *, limit: int) -> tuple[Refusal, ...]:

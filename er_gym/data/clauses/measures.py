@@ -170,6 +170,10 @@ _ASKED = 60
 """Letters after "the task is to" that say what it is."""
 
 
+_ENDS = re.compile(r"[.;!?。；，]|,? but\b|, (?:so|and|first)\b|但|不过")
+"""Where what is asked for ends."""
+
+
 def judge_tasks(thought: Thought) -> Iterator[Verdict]:
     """The task asks for something."""
     lexicon, known = lexicon_of(thought), thought.known
@@ -178,7 +182,7 @@ def judge_tasks(thought: Thought) -> Iterator[Verdict]:
     for span in sentences_of(thought):
         for match in lexicon.task.finditer(span.text):
             before = span.text[max(0, match.start() - 12) : match.end()]
-            rest = re.split("[.;!?。；]", span.text[match.end() : match.end() + _ASKED])[0]
+            rest = _ENDS.split(span.text[match.end() : match.end() + _ASKED])[0]
             if lexicon.undone.search(before) or lexicon.undone.search(rest):
                 continue
             if any(each.asks or each.conditional for each in span.clauses):

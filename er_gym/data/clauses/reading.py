@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from er_gym.data.clauses.lexicon import Lexicon, Words
 from er_gym.data.clauses.lexicon_en import LEXICON as ENGLISH
 from er_gym.data.clauses.lexicon_zh import LEXICON as CHINESE
-from er_gym.data.clauses.splitting import parts_of
 from er_gym.data.mentions import Mention
 from er_gym.data.phrases import MARK
 from er_gym.data.reading import Clause
@@ -77,9 +76,8 @@ def lexicon_of(thought: Thought) -> Lexicon:
 
 def clauses_of(thought: Thought) -> Iterator[tuple[Clause, Span]]:
     """Each clause of a thought, as a span too."""
-    for whole in thought.clauses:
-        for each in parts_of(whole, thought.phrases):
-            yield each, Span(each.text, each.mentions, each.places, each.sentence, (each,))
+    for each in thought.parts:
+        yield each, Span(each.text, each.mentions, each.places, each.sentence, (each,))
 
 
 def sentences_of(thought: Thought) -> Iterator[Span]:
