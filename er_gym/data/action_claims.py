@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.tasks import verbs
 from er_gym.thor import OBJECT_TYPES
 
-_PAST_VERB = {
+PAST_VERB = {
     verbs.OPEN: "open",
     verbs.CLOSE: "close",
     verbs.PICKUP: "pick up",
@@ -24,7 +25,10 @@ _PAST_VERB = {
 _NEAR = 4
 """Letters before a claim in which a negation is one of it."""
 _RECENT = 3
-"""So many actions ago, a failure can still be spoken of."""
+"""So many actions ago, a failure can still be spoken of as the last one."""
+_LAST = re.compile(r"\b(?:last|previous|preceding)\b|上一|上次|前一|刚")
+_STORY = re.compile(r"后来|才去的|之后才")
+"""A sentence that tells what was done, one thing after another."""
 
 
 # -- what was done ---------------------------------------------------------------------------------
@@ -43,20 +47,25 @@ def check_history(thought: Thought) -> Iterator[Refusal]:
                     ):
                         continue
                     for mention in clause.named(match, "y" if verb == verbs.PUT else "x"):
-                        if not _has_done(thought, verb, mention):
+                        if not has_done(thought, verb, mention):
                             yield Refusal(
                                 "history",
-                                f"The agent did not {_PAST_VERB[verb]} {name_of(mention)} before. "
+                                f"The agent did not {PAST_VERB[verb]} {name_of(mention)} before. "
                                 "Do not claim it.",
                             )
 
 
-def _has_done(thought: Thought, verb: str, mention: Mention) -> bool:
+def has_done(thought: Thought, verb: str, mention: Mention) -> bool:
+    """Whether the agent did that to something of that name, or is where it must have."""
     known, types = thought.known, all_interchangeable(mention.types)
     if verb == verbs.PICKUP and types & thought.held:
         return True
     if verb == verbs.NAVIGATE and known.at in types:
         return True
+    if verb == verbs.NAVIGATE and known.at in OBJECT_TYPES:
+        return any(each.on in types for _, each in thought.things([known.at])) or thought.done(
+            verb, types
+        )
     if verb in (verbs.OPEN, verbs.CLOSE) and thought.done(verbs.TOGGLE, types):
         return True
     if verb != "searched":
@@ -81,7 +90,9 @@ def check_outcome(thought: Thought) -> Iterator[Refusal]:
     for clause in thought.clauses:
         if clause.guessed and "seem" not in clause.text:
             continue
-        if phrases.failed.search(clause.text) and not failed_lately:
+        failed = phrases.failed.search(clause.text)
+        lately = failed and _LAST.search(failed.group())
+        if failed and not (failed_lately if lately else _has_failed(thought, clause)):
             yield Refusal(
                 "history",
                 "No action failed: do not say that one did."
@@ -96,6 +107,15 @@ def check_outcome(thought: Thought) -> Iterator[Refusal]:
             yield Refusal(
                 "history", f"The last action, {last.action}, failed; say so, or say nothing."
             )
+
+
+def _has_failed(thought: Thought, clause: Clause) -> bool:
+    """Whether an action failed that a clause may speak of."""
+    types = all_interchangeable(each for mention in clause.mentions for each in mention.types)
+    return any(
+        not each.success and (not types or each.action.object_type in types)
+        for each in thought.known.actions
+    )
 
 
 # -- what is decided -------------------------------------------------------------------------------
@@ -122,14 +142,20 @@ class Decided:
     later: bool
 
 
+def _hangs_on_another(thought: Thought, clause: Clause) -> bool:
+    """Whether a clause before it in its sentence says on which condition it holds."""
+    before = itertools.takewhile(lambda each: each is not clause, thought.clauses)
+    return any(each.sentence == clause.sentence and each.conditional for each in before)
+
+
 def check_decision(thought: Thought) -> Iterator[Refusal]:
     """Announces another action than the one that the turn takes."""
     known, phrases = thought.known, thought.phrases
-    decided = [each for each in _decided(thought) if each.act != "look around" or each.clause.last]
-    fitting = [each for each in decided if _fits(thought, each)]
-    others = [each for each in decided if each not in fitting and not each.later]
+    those = [each for each in decided(thought) if each.act != "look around" or each.clause.last]
+    fitting = [each for each in those if _fits(thought, each)]
+    others = [each for each in those if each not in fitting and not each.later]
     wrong = None
-    if decided and not fitting:
+    if those and not fitting:
         strong = [each for each in others if not each.weak]
         wrong = strong[-1] if strong else next((each for each in others if each.clause.last), None)
     elif others:
@@ -137,7 +163,7 @@ def check_decision(thought: Thought) -> Iterator[Refusal]:
         replaced = [
             each
             for each in others
-            if each is decided[-1] and phrases.instead.search(each.clause.text)
+            if each is those[-1] and phrases.instead.search(each.clause.text)
         ]
         wrong = next(iter((*first, *replaced)), None)
     if wrong is not None:
@@ -149,17 +175,22 @@ def check_decision(thought: Thought) -> Iterator[Refusal]:
         for clause in thought.clauses:
             if clause.guessed or clause.negated or clause.intended:
                 continue
+            if _hangs_on_another(thought, clause):
+                continue
             if phrases.over.search(clause.text):
                 yield Refusal(
                     "decision", f"The task is not done: the next action is {known.decision}."
                 )
 
 
-def _decided(thought: Thought) -> Iterator[Decided]:
+def decided(thought: Thought) -> Iterator[Decided]:
     """All actions that a thought decides on, in order."""
     phrases = thought.phrases
     for clause in thought.clauses:
-        if clause.asks:
+        if clause.asks or any(
+            each.sentence == clause.sentence and _STORY.search(each.text)
+            for each in thought.clauses
+        ):
             continue
         for start in phrases.decides.finditer(clause.text):
             rest = clause.text[start.end() :]
@@ -184,6 +215,7 @@ def _decided(thought: Thought) -> Iterator[Decided]:
                     bool(phrases.weak.search(start.group())),
                     bool(phrases.later.search(before))
                     or clause.conditional
+                    or _hangs_on_another(thought, clause)
                     or bool(phrases.later.match(body[match.end() :].lstrip(" ,"))),
                 )
                 break
@@ -225,6 +257,8 @@ def _fits(thought: Thought, decided: Decided) -> bool:
         return same and verb in (verbs.CLOSE, verbs.NAVIGATE, verbs.TOGGLE)
     if act == "put":
         return same and verb in (verbs.PUT, verbs.NAVIGATE, verbs.OPEN)
+    if act == "take" and not decided.thing:
+        return verb in (verbs.PICKUP, verbs.NAVIGATE, verbs.OPEN)
     if act == "take":
         return _takes(thought, things, verb, target)
     verb_of = {"toggle": verbs.TOGGLE, "slice": verbs.SLICE}

@@ -68,16 +68,16 @@ def check_hidden(thought: Thought) -> Iterator[Refusal]:
             for phrase in phrases.located:
                 for match in phrase.finditer(clause.text):
                     for mention in _subjects(clause, match, phrases):
-                        if not mention.types & thought.seen and not _is_given(thought, mention):
+                        if not mention.types & thought.seen and not is_given(thought, mention):
                             yield _nowhere(mention)
         for match in _matches(clause, (*phrases.on, *phrases.out_of)):
             if match.re not in phrases.out_of and (
-                clause.intended or _is_placing(clause, match, phrases)
+                clause.intended or is_placing(clause, match.start("xs"), phrases)
             ):
                 continue
             (holder,) = clause.named(match, "y")
             for mention in _subjects(clause, match, phrases):
-                if mention.types & thought.seen or _is_given(thought, mention):
+                if mention.types & thought.seen or is_given(thought, mention):
                     continue
                 yield Refusal(
                     "hidden",
@@ -102,7 +102,7 @@ def check_inside(thought: Thought) -> Iterator[Refusal]:
 def check_support(thought: Thought) -> Iterator[Refusal]:
     """Says that an object in view lies in or on another object than it does."""
     for mention, holder in _told_to_be_on(thought):
-        wrong = _not_on(thought, mention, holder)
+        wrong = not_on(thought, mention, holder)
         if wrong:
             yield Refusal(
                 "support", f"{name_of(mention)} is not in or on {name_of(holder)}: {wrong}."
@@ -116,7 +116,7 @@ def _told_to_be_on(thought: Thought) -> Iterator[tuple[Mention, Mention]]:
         if not clause.is_fact or clause.past:
             continue
         for match in _matches(clause, phrases.on):
-            if not _is_placing(clause, match, phrases):
+            if not is_placing(clause, match.start("xs"), phrases):
                 (holder,) = clause.named(match, "y")
                 for mention in _subjects(clause, match, phrases):
                     yield mention, holder
@@ -158,26 +158,6 @@ def _bears_there(thought: Thought, mention: Mention, clause: Clause, direction: 
     )
 
 
-def check_denied(thought: Thought) -> Iterator[Refusal]:
-    """Claims not to see an object that is in view."""
-    for clause, match in _denials(thought, thought.phrases.denied):
-        for mention in clause.named(match, "xs"):
-            if mention.types <= thought.known.in_view:
-                yield Refusal("unseen", f"{name_of(mention)} is in view; do not say it is not.")
-
-
-def check_count(thought: Thought) -> Iterator[Refusal]:
-    """Claims that more objects of a type are in view than there are."""
-    for clause in thought.clauses:
-        if not clause.is_fact or clause.past or clause.wanted:
-            continue
-        for match in thought.phrases.counted.finditer(clause.text):
-            (mention,) = clause.named(match, "x")
-            there = sum(1 for _ in thought.things(mention.types))
-            if 0 < there < thought.phrases.numbers[match["n"]]:
-                yield Refusal("count", f"Only {there} of {name_of(mention)} can be seen.")
-
-
 # -- states and the hand ---------------------------------------------------------------------------
 
 
@@ -195,8 +175,8 @@ def check_state(thought: Thought) -> Iterator[Refusal]:
             claims.append((clause.it, of_it))
         for mention, match in claims:
             said = match.groupdict()
-            word = next((word for word in _STATES if said.get(word)), "on")
-            wrong = _is_not(thought, mention, word, bool(match["no"]))
+            word = next((word for word in STATES if said.get(word)), "on")
+            wrong = is_not(thought, mention, word, bool(match["no"]))
             if wrong:
                 yield Refusal("state", f"{name_of(mention)} {wrong}; say so, or leave it out.")
 
@@ -262,12 +242,16 @@ def _subjects(clause: Clause, match: re.Match[str], phrases: Phrases) -> list[Me
     return found
 
 
-def _is_placing(clause: Clause, match: re.Match[str], phrases: Phrases) -> bool:
-    """Whether the thing is being put there, or looked for there, rather than lying there."""
-    return bool(phrases.placing.search(clause.text[: match.start("xs")]))
+def is_placing(clause: Clause, place: int, phrases: Phrases) -> bool:
+    """Whether a thing is being put somewhere, or looked for there, rather than lying there.
+
+    Args:
+        place: where its name stands in the clause.
+    """
+    return bool(phrases.placing.search(clause.text[:place]))
 
 
-def _is_given(thought: Thought, mention: Mention) -> bool:
+def is_given(thought: Thought, mention: Mention) -> bool:
     """Whether the instruction says where the thing is ("that is in the Drawer")."""
     return bool(_GIVEN.search(thought.known.instruction)) and bool(
         mention.types & all_interchangeable(named_in(thought.known.instruction))
@@ -317,7 +301,7 @@ def _holders(thought: Thought, each: SeenObject, view: Sequence[SeenObject]) -> 
     return {*all_interchangeable(each for each in found if each in OBJECT_TYPES)}
 
 
-def _not_on(thought: Thought, mention: Mention, holder: Mention) -> str:
+def not_on(thought: Thought, mention: Mention, holder: Mention) -> str:
     """Where a thing in view lies, if it does not lie on the holder that is claimed; else ``""``."""
     there = list(thought.things(mention.types))
     if not there:
@@ -328,7 +312,8 @@ def _not_on(thought: Thought, mention: Mention, holder: Mention) -> str:
         return ""  # another one may be in view
     where = set()
     for direction, each in there:
-        if "pickupable" not in OBJECT_TYPES[each.type].properties:
+        properties = OBJECT_TYPES[each.type].properties
+        if "pickupable" not in properties and not (each.on and "moveable" in properties):
             return ""
         holders = _holders(thought, each, thought.views[direction])
         if holders & holder.types:
@@ -339,9 +324,9 @@ def _not_on(thought: Thought, mention: Mention, holder: Mention) -> str:
     return " or ".join(sorted(where))
 
 
-def _is_not(thought: Thought, mention: Mention, word: str, negated: bool) -> str:
+def is_not(thought: Thought, mention: Mention, word: str, negated: bool) -> str:
     """What is so, if nothing of that name in view is in that state; else ``""``."""
-    wanted, attributes = _STATES[word]
+    wanted, attributes = STATES[word]
     wanted = wanted != negated
     there = [each for _, each in thought.things(mention.types)]
     states = [
@@ -355,7 +340,7 @@ def _is_not(thought: Thought, mention: Mention, word: str, negated: bool) -> str
     return f"is {words[not wanted]}"
 
 
-_STATES: Mapping[str, tuple[bool, tuple[str, ...]]] = {
+STATES: Mapping[str, tuple[bool, tuple[str, ...]]] = {
     "open": (True, ("open",)),
     "closed": (False, ("open",)),
     "on": (True, ("toggled",)),

@@ -1,8 +1,9 @@
 """The critic: checks a thought against what the agent could know.
 
-It checks what a thought states as a fact; guesses, questions, plans and wishes state nothing. It
-accepts sentences that it cannot parse. So it does not refuse a true thought for its wording, but it
-also accepts a false one in a wording that it does not know.
+It checks what a thought states as a fact, and refuses guesses at what is in view or was seen; other
+guesses, questions, plans and wishes state nothing. It accepts sentences that it cannot parse. So it
+does not refuse a true thought for its wording, but it also accepts a false one in a wording that it
+does not know.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import re
 from collections.abc import Callable, Iterator
 
 from er_gym.data import action_claims, claims, form, remembered
+from er_gym.data.clauses.judging import check_clauses
 from er_gym.data.knowledge import Knowledge
 from er_gym.data.thought import Refusal, Thought
 from er_gym.data.trajectory import ThoughtKind
@@ -30,20 +32,19 @@ CHECKS: tuple[Callable[[Thought], Iterator[Refusal]], ...] = (
     claims.check_unseen,
     claims.check_hidden,
     claims.check_inside,
-    claims.check_denied,
     claims.check_support,
     claims.check_side,
-    claims.check_count,
     claims.check_state,
     claims.check_hand,
     action_claims.check_history,
     action_claims.check_outcome,
     action_claims.check_decision,
     remembered.check_remembered,
+    check_clauses,
 )
 """Every check. Codes: ``length``, ``language``, ``tags``, ``leak``, ``repeat``, ``unseen``,
 ``hidden``, ``support``, ``side``, ``count``, ``state``, ``held``, ``history``, ``decision``,
-``remembered``."""
+``remembered``, ``memory``, ``distance``, ``room``, ``task``."""
 
 
 def check(text: str, kind: ThoughtKind, knowledge: Knowledge, *, limit: int) -> tuple[Refusal, ...]:

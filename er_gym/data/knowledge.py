@@ -69,6 +69,7 @@ class Knowledge:
             ``""`` for the start) where it was in view last.
         lay: of those, on what each lay when it was in view last, or where the agent has put it
             since.
+        sightings: every such type, with all places from which it was in view, in order.
         visits: the places searched for the present subgoal, in order.
         navigable, interactable: the object types that are legal targets now.
         last: the last action; None at the first turn.
@@ -90,6 +91,7 @@ class Knowledge:
     views: Mapping[str, Sequence[SeenObject]] = field(default_factory=dict)
     seen: Mapping[str, str] = field(default_factory=dict)
     lay: Mapping[str, str] = field(default_factory=dict)
+    sightings: Mapping[str, Sequence[str]] = field(default_factory=dict)
     visits: Sequence[Visit] = ()
     navigable: Sequence[str] = ()
     interactable: Sequence[str] = ()
@@ -134,10 +136,12 @@ def knowledge_at(
     turn, before = turns[index], turns[:index]
     seen: dict[str, str] = {}
     lay: dict[str, str] = {}
+    sightings: dict[str, dict[str, None]] = {}
     for each in (*before, turn):
         around = (one for view in each.views.values() for one in view)
         for one in (*reversed(list(around)), *reversed(each.view)):  # the nearest is the last
             seen[one.type] = each.at
+            sightings.setdefault(one.type, {})[each.at] = None
             if one.type != each.held:
                 lay[one.type] = one.on
         if each is not turn and each.success and each.verb == verbs.PUT and each.held:
@@ -163,6 +167,7 @@ def knowledge_at(
         at=turn.at,
         seen=seen,
         lay={kind: on for kind, on in lay.items() if on and kind != turn.held},
+        sightings={name: tuple(places) for name, places in sightings.items()},
         visits=_visits(before, turn.subgoal),
         navigable=turn.navigable,
         interactable=turn.interactable,

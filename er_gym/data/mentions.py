@@ -100,7 +100,7 @@ _WEAK = frozenset(
     novel ornament paper pan pen pepper picture pictures plate plant pot rack range rag remote safe
     salt scoop screen seat shade shades shower soap spray stand stove switch switches tap tissue
     toast trash turner vacuum watch watches weight weights window wine holder chest urn vault drape
-    tub basin brush garbage mobile
+    tub basin brush garbage mobile roll volume
     """.split()
 )
 """English names that are other words as well: they count after an article or the like."""

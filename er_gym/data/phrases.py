@@ -31,7 +31,6 @@ class Phrases:
             wanted, what is usual, what was, what the agent is going to do.
         seen: claims to see ``xs``.
         located: claims that ``xs`` are somewhere.
-        denied: claims not to see any of ``xs``.
         on: claims that ``xs`` lie in or on ``y``.
         out_of: means to take ``xs`` out of ``y``.
         placing: before ``xs``: it is being put there.
@@ -54,8 +53,6 @@ class Phrases:
         later, first, instead: marks of a step that is not the next, that is, or that replaces it.
         over: claims that the task is done.
         leak, labels, foreign: what no thought may say.
-        numbers: numbers before a name, by word.
-        counted: a number, ``n``, of things ``x`` in view.
     """
 
     sentence: Phrase
@@ -72,7 +69,6 @@ class Phrases:
     intention: Phrase
     seen: Sequence[Phrase]
     located: Sequence[Phrase]
-    denied: Sequence[Phrase]
     on: Sequence[Phrase]
     out_of: Sequence[Phrase]
     placing: Phrase
@@ -100,5 +96,3 @@ class Phrases:
     leak: Phrase
     labels: Phrase
     foreign: Phrase
-    numbers: Mapping[str, int]
-    counted: Phrase

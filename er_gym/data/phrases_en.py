@@ -59,7 +59,7 @@ _IS = (
     r"(?:is|are|'s|stays?|remains?|stands?|sits?|was left|has been left|have been left|has been"
     r"|have been|appears|looks)"
 )
-_GO = "go/head/walk/move/navigate/travel/make my way/get/proceed/return/come/hurry/step"
+_GO = "off/on my way/headed/go/head/walk/move/navigate/travel/make my way/get/proceed/return/come/hurry/step"
 _BEFORE_ACT = (
     r"(?: (?:now|first|next|then|just|simply|quickly|therefore|also|at once|immediately|directly"
     r"|try to|try and|go ahead and|start by|begin by|turn to|carefully|to|be|right away|instead"
@@ -95,10 +95,10 @@ PHRASES = Phrases(
         _word(
             "may/might/could(?! not)/perhaps/maybe/possibly/probably/likely/likeliest/likelier/presumably"
             "/potentially/possible/plausible/plausibly/conceivably/suppose/guess/assume/suspect"
-            "/expect/expected/imagine/wonder/wondering/hoped/had hoped/thought/can picture/i picture/picturing/chance/chances/hope/hoping/hopefully/bet"
+            "/expect/expected/imagine/wonder/wondering/hoped/had hoped/(?<!a )(?<!no )thought/can picture/i picture/picturing/chance/chances/hope/hoping/hopefully/bet"
             "/should be/must be/must have/should have/ought to/seems/seem/appears to be/as if/as though"
             "/supposedly/apparently/unclear/unsure/not sure/uncertain/cannot tell/can't tell"
-            "/would/i think/i believe/i'd/or/either/no idea/unless"
+            "/would/i think/i believe/i'd(?! (?:[a-z]+ed|gone|been|taken|seen|put|shut|left|had|got|come|found|already|just|even)\b)/or/either/no idea/unless"
             "/whether/reckon/apt/doubt/odds/likelihood/looks like/look like/resembles"
         ),
     ),
@@ -108,8 +108,8 @@ PHRASES = Phrases(
         r"|n't\b|n’t\b"
     ),
     condition=_any(
-        r"\b(?:if|unless|in case|once|until|as soon as|otherwise|before(?= [a-z])|provided|suppose|assuming"
-        r"|even when|whenever|wherever|would have|in order to|so as to)\b|\bwhen (?!i (?:opened|looked|went|got|arrived|came))"
+        r"\b(?:if|unless|in case|(?<!at )once(?! (?:before|already|more|again)\b|[,.;]|$)|until|as soon as|otherwise|before(?= [a-z])(?! (?:anything|everything|me|that|this|now|us|long)\b| (?:i|we) (?:[a-z]+ed|left|went|took|came|got|had|ever)\b| i'd\b)|provided|suppose|assuming"
+        r"|even when|whenever|wherever|would have|in order to|so as to)\b|\bwhen (?!i (?:[a-z]+ed|was|stood|saw|went|got|came|took|had)\b)"
     ),
     goal=_any(
         r"\b(?:need(?:s|ed)?|have to|has to|look(?:ing)? for|search(?:ing|es|ed)? for|search of|hunt(?:ing)?"
@@ -126,7 +126,7 @@ PHRASES = Phrases(
         r"|makes sense|logical|reasonable|makes? (?:a|it) good|is where (?:people|one|you)|are (?:usually )?(?:kept|stored))\b"
     ),
     past=re.compile(
-        r"\b(?:was|were|had|earlier|before|previously|remember|recall|at the start|from the start"
+        r"\b(?:was|were|had|earlier|before(?! (?:me|us)\b)|previously|remember|recall|at the start|from the start"
         r"|at first|used to|initially|a moment ago)\b"
     ),
     intention=_any(
@@ -152,13 +152,6 @@ PHRASES = Phrases(
     located=(
         re.compile(rf"{_XS}(?:,? (?:which|that))?(?:(?: (?:{_HOW}))* (?:{_LIES})|'s)(?: (?:{_HOW}|{_LIES}))* (?:{_WHERE})\b"),
         re.compile(rf"where {_D}{_XS}(?: (?:{_HOW}))* (?:is|are|lies|sits|rests|can be found|has been|waits|hides)\b"),
-    ),
-    denied=(
-        re.compile(
-            r"\b(?:i (?:can ?not|can't|do not|don't) (?:yet |currently )?see|there (?:is|are) no|no sign of|see no|there isn't|there aren't)"
-            rf"(?: any| an?| the)? {_D}{_XS}(?= *(?:$|[.,!]|in sight|in view|yet\b|anywhere|at all|from here))"
-        ),
-        re.compile(rf"{_XS} (?:is|are) (?:not (?:in (?:sight|view)|visible)|nowhere (?:to be seen|in sight))"),
     ),
     on=(
         re.compile(rf"{_XS},?(?: (?:which|that))?(?: (?:{_HOW}|{_LIES}))* {_ON} {_D}{_Y}(?! (?:in front|that i))"),
@@ -306,8 +299,10 @@ PHRASES = Phrases(
         r"\bmade up my mind to\b|\blet me\b|\blet's\b|\blet us\b|\btime to\b|\bready to\b",
         r"\b(?:next|best|right|obvious|logical|sensible|first|immediate|remaining|only) (?:step|move|thing|action|option|choice|place|idea|course)[^.,§]{0,40}? (?:is|will be)(?: now)?(?: to)?\b",
         r"\bmakes? (?:the most |more |good |perfect )?sense to\b|\bmy (?:plan|decision|choice) is(?: now)? to\b|\bdecision is to\b|\bdecided(?: to|:)",
+        r"\b(?:is|are) (?:what|where|the one) i(?:'ll| will|'m going to)(?= (?:open|go|take|head|close|pick|visit|try|check) )",
         r"\b(?:so|now|therefore|thus|hence|next|then|accordingly),? i(?= )",
-        r"^i(?= (?:now |therefore |simply |then )?(?:go|head|walk|open|close|shut|pick|take|grab|put|place|switch|toggle|navigate|return|approach)\b)",
+        r"\bi'm(?= (?:now )?(?:off|on my way|headed) to\b)",
+        r"^i(?= (?:now |therefore |simply |then )?(?:go|head|walk|open|close|shut|pick|take|grab|place|switch|toggle|navigate|return|approach)\b)",
     ),
     before_act=re.compile(_BEFORE_ACT),
     weak=re.compile(r"\b(?:should|must|need to|have to|want to|ought to|ready to)$"),
@@ -333,7 +328,7 @@ PHRASES = Phrases(
         "end": re.compile(r"(?:end|finish|stop(?! and\b)|conclude|wrap up|call it)(?: the task| here| now| it| this| there| my| everything| the)?\b"),
     },
     later=re.compile(
-        r"\b(?:later|afterwards?|after (?:that|this)|eventually|finally|in the end|then|once|subsequently|at the end|lastly|next i|second|secondly|as well|also|still|come back|if need be|if necessary|only|and then|if|unless|when|until|before|otherwise|could|might|would|don't|not|no|never|rather than|instead of)\b|n't\b"
+        r"\b(?:later|afterwards?|after|eventually|finally|in the end|then|once|subsequently|at the end|lastly|next i|second|secondly|as well|also|still|come back|if need be|if necessary|only|and then|if|unless|when|until|before|otherwise|could|might|would|don't|not|no|never|rather than|instead of)\b|n't\b"
     ),
     first=re.compile(r"\b(?:first|right now|right away|immediately|at once|to begin with|to start)\b"),
     instead=re.compile(r"\b(?:instead|actually|on second thought|rather|change my mind|no,|wait)\b"),
@@ -357,7 +352,5 @@ PHRASES = Phrases(
         r"\b(?:je|vais|dans|pièce|une|est|les|des|autour|nous|sur|pour|avec|ich|der|die|das|und|nicht|mich|wo|ein|eine|einen|ist|zu|könnte|auf|mit"
         r"|voy|los|las|una|está|por|para|que|en|del|hay|habitación|el|io|il|della|che|sono|nella|eu|vou|para|não|um|uma|em|de|la|le|um)\b"
     ),
-    numbers={"two": 2, "both": 2, "three": 3, "four": 4, "five": 5, "six": 6, "2": 2, "3": 3, "4": 4, "5": 5},
-    counted=re.compile(rf"\b(?P<n>two|three|four|five|six|2|3|4|5) (?:[a-z]+ )?{_X}"),
 )  # fmt: skip
 """English."""

@@ -10,6 +10,7 @@ from er_gym.data.knowledge import Knowledge
 from er_gym.data.mentions import Mention, all_interchangeable, named_in
 from er_gym.data.phrases import Phrases
 from er_gym.data.reading import PHRASES, Clause, read
+from er_gym.data.splitting import parts_of
 from er_gym.data.trajectory import SeenObject
 from er_gym.thor import OBJECT_TYPES
 
@@ -51,6 +52,11 @@ class Thought:
     def clauses(self) -> tuple[Clause, ...]:
         """What it says."""
         return read(self.text, self.known.language)
+
+    @cached_property
+    def parts(self) -> tuple[Clause, ...]:
+        """The clauses, split further by polarity."""
+        return tuple(part for each in self.clauses for part in parts_of(each, self.phrases))
 
     @cached_property
     def views(self) -> Mapping[str, Sequence[SeenObject]]:

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 from planted_lies import Planted, honest, planted
-from played_turns import knowledge
 from support import in_one_test
 
+from benchmarks.harness.played_turns import knowledge
 from er_gym.data.critic import CHECKS, check
 from er_gym.data.form import thought_length
 from er_gym.data.knowledge import Knowledge

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from random import Random
 
-import played_turns
 import pytest
 
 from agents.expert.model_places import ModelPlaces, named_places
@@ -20,6 +19,7 @@ from agents.vlm.chat import Message, ModelError, Picture, Reply, Usage
 from agents.vlm.clients.scripted import ScriptedClient
 from agents.vlm.settings import AgentSettings
 from benchmarks.checks.scripted_expert import SAYS, good, in_tags
+from benchmarks.harness import played_turns
 from er_gym.data.critic import check
 from er_gym.data.knowledge import Knowledge, knowledge_at
 from er_gym.data.trajectory import Language, ThoughtKind

@@ -1,0 +1,262 @@
+"""English word classes."""
+
+from __future__ import annotations
+
+import re
+
+from er_gym.data.clauses.lexicon import Lexicon, Words
+from er_gym.data.phrases import MARK
+from er_gym.tasks import verbs
+
+_NO = (
+    "no|not|nor|on|in|to|of|for|with|from|and|or|but|at|by|near|about|into|onto|than|as|if|is|are"
+    "|i|we|it|there|see|has|have|had|which|can|will|was|were|then|so|before|after|until|when|while"
+    "|out|up|down|off|over|back|nothing|something|anything|everything|that|where|because|without"
+)
+_D = r"(?:(?!(?:" + _NO + r") )[a-z0-9'-]+ ){0,3}"
+"""Articles and adjectives before a name."""
+_OF = r"(?:the (?:lid|door|doors|inside|front|top|side) of )?"
+_XS = rf"(?P<xs>{MARK}(?:(?:,? and,? |,? n?or |, |,? as well as |/){_D}{MARK})*)"
+_X, _Y = f"(?P<x>{MARK})", f"(?P<y>{MARK})"
+_ADVERB = (
+    "already|just|now|also|then|first|previously|finally|only|even|once|thoroughly|carefully|twice"
+    "|indeed|in fact|certainly|actually|successfully|easily|quickly|earlier|never|not|ever|so much as"
+    "|properly|simply|somehow|promptly|duly"
+)
+_I = rf"\b(?:i|we)(?:'ve|'d| have| had| did manage to| managed to| was able to| was just| did)?(?: not|n't)?(?: (?:{_ADVERB}))*(?:, [^,{MARK}]{{1,40}},)?"
+_DONE = rf"(?:{_I}|\bhaving(?: (?:{_ADVERB}))*|\bafter(?: (?:{_ADVERB}))*|\bonce i(?:'d| had)?(?: (?:{_ADVERB}))*|(?<=§)[^§,.]{{0,30}}(?:,| and| or|,? and then|,? then)(?: i)?(?: (?:{_ADVERB}))*)"
+_WAS = rf"(?:(?:has|have|had|'s|'d)(?: (?:{_ADVERB}))* been|was|were|got)(?: (?:{_ADVERB}))*"
+_BY_OTHERS = r"(?! by (?!me\b|my\b|hand))"
+
+
+def _any(*phrases: str) -> Words:
+    return re.compile("|".join(phrases))
+
+
+def _deed(past: str, gerund: str, participle: str, *more: str) -> tuple[Words, ...]:
+    """A verb with its object: done by the agent, passive, or in a relative clause."""
+    return (
+        re.compile(rf"(?:{_DONE}) (?:{past}|{gerund}) {_D}{_OF}{_X}"),
+        re.compile(rf"{_X} (?:that |which )?(?:{_I}) (?:{past})(?=$|[,.;: ](?!{_D}{MARK}))"),
+        re.compile(rf"{_X} {_WAS} (?:{participle})\b{_BY_OTHERS}"),
+        *(re.compile(each) for each in more),
+    )
+
+
+_OPENED = (
+    r"opened(?: up)?|pulled open|swung open|flung open|slid open|unlatched|yanked open|prised open"
+)
+_TOOK = (
+    r"picked up|took(?: up| out| hold of| away)?|taken(?: up| out| away)?|grabbed(?: hold of)?|got hold of|gotten hold of|fetched|collected|retrieved|snatched(?: up)?"
+    r"|scooped up|seized|gathered(?: up)?|gripped|got my hands? on|laid hold of|plucked|removed|went and (?:fetched|got|took|picked up)|come away with|came away with"
+)
+_PUT = r"placed|dropped(?: off)?|stowed(?: away)?|laid|deposited|stored|tossed|thrown|threw|delivered|shoved|tucked|popped|moved|slipped|parked"
+_SEARCHED = (
+    r"searched(?: through)?|checked|examined|inspected|explored|investigated|combed(?: through)?|rummaged (?:in|through|around in)|gone (?:all )?through|went (?:all )?through|been (?:all )?through|sifted through"
+    r"|(?:looked|peered|peeked|glanced|had a look|taken a look|took a look|poked around|dug around|stuck my head) (?:into|inside|through|in)|ruled out|tried|gone over|crossed off"
+)
+_WENT = (
+    r"(?:gone|went|been|walked|moved|travelled|traveled|navigated|returned|headed|run|hurried|stepped|rolled|driven|drove|come|came|got|popped|stopped off|made a trip|made my way|made it|made a stop|paid a visit)"
+    r"(?: straight| right| all the way| back)?(?: over| across| up)?(?: anywhere near| near| to(?! see)| by)|stopped (?:at|by)|visited|reached|approached|called at|paused at|set foot near|dropped by|arrived at|swung by"
+)
+_HAVE = (
+    r"(?:\b(?:i|we)(?:'ve|'d| have| had)|\bhaving)(?: (?:already|just|now|then|finally|never|not))*"
+)
+_IN = r"(?:in|into|inside|on|onto|on top of|to|down on|away in|upon)"
+
+LEXICON = Lexicon(
+    deeds={
+        verbs.OPEN: (
+            *_deed(_OPENED, "opening|pulling open", "opened"),
+            re.compile(rf"(?:{_I}|\bhaving) (?:lifted|raised|flipped up|popped) {_D}{_X}(?: lid| seat)?"),
+        ),
+        verbs.CLOSE: _deed(
+            r"closed(?: up)?|pushed shut|slammed(?: shut)?", "closing|shutting", r"(?:properly |firmly )?(?:closed|shut) again",
+            rf"(?:{_HAVE}) shut {_D}{_X}",
+            rf"(?:{_I}) (?:got|pushed|pulled|slid) {_D}{_X} (?:closed|shut)",
+        ),
+        verbs.PICKUP: (
+            *_deed(_TOOK, "picking up|taking|grabbing|fetching|collecting|retrieving", "picked up|taken|grabbed|collected|fetched|retrieved"),
+            re.compile(rf"(?:{_DONE}) (?:picked|took|taken|lifted|picking|pick) {_D}{_X}(?: right)? (?:up|away|out|along|with me)\b"),
+            re.compile(r"\b(?:managed|was able|did manage) to (?:pick up|take|grab|get hold of|get|fetch|collect) " + _D + _X),
+            re.compile(rf"\b(?:grabbing|taking|picking up|getting|fetching|lifting|collecting) (?:hold of )?{_D}{_X} (?:was (?:easy|simple|no (?:trouble|problem|effort)|effortless|a breeze|quick|straightforward|a success)|worked(?! out badly)|went (?:well|fine|smoothly|through|off)|succeeded|posed no)"),
+            re.compile(rf"\bsucceeded in (?:grabbing|taking|picking up|getting|fetching|lifting|collecting) (?:hold of )?{_D}{_X}"),
+            re.compile(rf"\bi did (?:pick up|take|grab|get|fetch|collect) {_D}{_X}"),
+            re.compile(rf"{_X} came (?:along|away|up|off)\b[^,.]{{0,40}}(?:when|as) i (?:grabbed|took|pulled|reached|picked)"),
+            re.compile(rf"\b(?:grab|attempt|try|reach|lunge) (?:at|for) {_D}{_X} (?:went|worked|succeeded|paid off|was a success|came off)(?! wrong| nowhere| out)"),
+        ),
+        verbs.PUT: (
+            re.compile(rf"(?:{_HAVE}) (?:put|set|left) (?:it|them|{_D}{MARK})(?: back| down| away| safely| off)* {_IN} {_D}{_Y}"),
+            re.compile(rf"(?:{_DONE}) (?:{_PUT}|putting|placing|dropping) (?:it|them|{_D}{MARK})(?: back| down| away| safely| off)* {_IN} {_D}{_Y}"),
+            re.compile(rf"{MARK} (?:has|have|had|is|was)(?: (?:{_ADVERB}))* been (?:{_PUT}|put|set)(?: back| down| away| safely| off)* {_IN} {_D}{_Y}"),
+        ),
+        verbs.TOGGLE: (
+            re.compile(rf"(?:{_DONE}) (?:switched|turned|flicked|flipped|toggled|powered|shut) (?:on|off) {_D}{_X}"),
+            re.compile(rf"(?:{_DONE}) (?:switched|turned|flicked|flipped|powered|toggled) {_D}{_X}(?: back)? (?:on|off)\b"),
+        ),
+        verbs.NAVIGATE: (
+            re.compile(rf"(?:{_DONE}) (?:{_WENT}) {_D}{_X}"),
+            re.compile(rf"(?:{_DONE}) (?:visiting|going to|walking to|reaching) {_D}{_X}"),
+            re.compile(rf"{_X} {_WAS} visited\b"),
+        ),
+        "searched": (
+            *_deed(_SEARCHED, "searching|checking|inspecting|examining|going through|looking (?:in|into|inside|through)|peering into", "searched|checked|examined|inspected|explored|ruled out"),
+            re.compile(rf"\bmy (?:search|inspection|check) of {_D}{_X}"),
+        ),
+    },
+    denied_deeds={
+        verb: (
+            re.compile(rf"\b(?:i|we) (?:did not|didn't|never did|did never)(?: (?:ever|even|once|actually|yet))* (?:{words}) {_D}{_OF}{_X}"),
+        )
+        for verb, words in (
+            (verbs.OPEN, "open|pull open"),
+            (verbs.CLOSE, "close|shut"),
+            (verbs.PICKUP, "pick up|take|grab|touch|collect|fetch"),
+            (verbs.NAVIGATE, "(?:go|get|come|walk|move|travel|head)(?: over| back| up)?(?: anywhere near| near| to| by)|visit|approach|reach"),
+            ("searched", "(?:look|peek|peer)(?: into| in| inside| through)|search|check|inspect|examine"),
+        )
+    },
+    first_try=re.compile(r"\b(?:at|on|with) (?:the|my) (?:very )?first (?:try|attempt|go|grab|shot)|\bfirst time round|\bfirst (?:try|attempt|grab) (?:worked|succeeded|went)|\b(?:straight off|in one go|at once|without a hitch)\b"),
+    undone=re.compile(r"\b(?:never|not|nothing|without|neither|nor|none|no|cannot|yet to|rather than|instead of|failed|unable|tried to|meant to|wanted to)\b|n't\b"),
+    nothing={
+        verbs.OPEN: re.compile(r"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|even|actually|ever|so far))* (?:opened?) (?:a (?:single )?thing|anything|any (?:of (?:the|these) )?(?:container|door|thing)s?|one thing)\b|\bopened (?:nothing|not a thing)\b|\bnothing(?: at all)? (?:has been|was|is) opened\b|\bwithout (?:ever |once )?opening anything\b"),
+        verbs.PICKUP: re.compile(r"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|even|actually|ever|so far))* (?:picked up|taken|touched|pick up|take|grabbed) (?:a (?:single )?thing|anything|any (?:item|object)s?)\b|\b(?:picked up|taken|grabbed) (?:nothing|not a thing)\b|\bpicked nothing up\b|\bnothing(?: at all)? (?:has been|was) (?:picked up|taken)\b"),
+        verbs.NAVIGATE: re.compile(r"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|even|actually|ever|so far))* (?:moved|gone anywhere|left (?:the )?(?:start|spot|my spot|where i (?:started|began))|budged|taken a (?:single )?step|gone to (?:any|a single) (?:place|thing))\b|\bnot moved (?:an inch|at all)\b"),
+    },
+    plain_verbs={
+        verbs.OPEN: re.compile(r"\b(?:open(?:ed|ing)?|pull(?:ed|ing)|lift(?:ed|ing)?|raising)\b"),
+        verbs.CLOSE: re.compile(r"\b(?:clos(?:e|ed|ing)|shut(?:ting)?|lower(?:ed|ing)?)\b"),
+        verbs.PICKUP: re.compile(r"\b(?:pick(?:ed|ing)?|tak(?:e|en|ing)|took|grab(?:bed|bing)?|fetch(?:ed|ing)?|get(?:ting)?|got|collect(?:ed|ing)?|hand|grip)\b"),
+        verbs.PUT: re.compile(r"\b(?:put(?:ting)?|plac(?:e|ed|ing)|drop(?:ped|ping)?|insert(?:ing)?|stow(?:ed|ing)?)\b"),
+        verbs.TOGGLE: re.compile(r"\b(?:switch(?:ed|ing)?|turn(?:ed|ing)? o(?:n|ff)|toggl(?:e|ed|ing)|flick(?:ed)?)\b"),
+        verbs.NAVIGATE: re.compile(r"\b(?:went|gone|go|going|walk(?:ed|ing)?|stopped|visit(?:ed|ing)?|reach(?:ed|ing)|came|arriv(?:ed|ing)|head(?:ed|ing)|stood)\b"),
+    },
+    failing=re.compile(r"\b(?:fail(?:ed|ure)?|attempt|tried|try|couldn't|could not|missed|in vain|nothing|didn't|unsuccessful|grab at)\b"),
+    order=(
+        re.compile(r"\bfirst(?:,| i|ly|\b)(?P<a>[^.;]{0,120}?§[^.;]{0,120}?)(?:,|\band\b)?\s*(?:and )?(?:only )?(?:then|afterwards|after that|next|later|later on)\b(?P<b>[^.;]{0,120}?§)"),
+        re.compile(r"(?P<a>[^.;,]{0,90}§[^.;,]{0,90}?)(?: even| well| long| right| just)? before (?P<b>(?:i|ever|going|opening|picking|taking|touching|visiting|turning|checking|looking|even|so|the|my|that)\b[^.;,]{0,90}?§)"),
+        re.compile(r"(?P<a>[^.;]{0,120}§[^.;]{0,120}?)(?:,| and|;)+ (?:and )?(?:it was )?(?:only )?(?:then|afterwards|afterward|after that|later|subsequently)(?: that| did| on)? (?P<b>[^.;]{0,120}?§)"),
+        re.compile(r"\bit was(?: only)? after (?P<a>[^.;]{0,120}?§[^.;]{0,120}?) that (?P<b>[^.;]{0,120}?§)"),
+        re.compile(r"(?P<a>[^.;,]{0,90}§[^.;,]{0,90}?) (?:first|beforehand),? (?:and )?(?:only )?(?:then|afterwards|after that|later)\b(?P<b>[^.;,]{0,90}?§)"),
+        re.compile(r"(?P<b>[^.;,]{0,90}§[^.;,]{0,90}?) (?:only |right |just |shortly )*after (?P<a>(?:i|having|opening|picking|taking|visiting|going|checking|looking|closing|reaching|switching|putting|the|my)\b[^.;,]{0,90}?§)"),
+        re.compile(r"\bonly (?:once|after|when) (?P<a>[^.;,]{0,90}?§[^.;,]{0,90}?),? did i (?P<b>[^.;,]{0,90}?§)"),
+    ),
+    planned=re.compile(r"\b(?:will|'ll|let|going to|shall|should|need|must|could|would|can|may|might|want|plan|if|if i|until|to do|i'm|i am|had i|hadn't|next step)\b"),
+    told=re.compile(r"\b(?:told(?! to\b)|system|message|feedback|remark|reply|replied|response|reported|complain(?:ed|t)|came back (?:as|with)|was (?:turned down|refused|rejected|denied)|refused (?:to|when|my)|notice (?:said|read)|notified|informed|according to|warned|advised|error said|it said|they said)\b"),
+    answers={
+        "full hand": re.compile(r"\b(?:hands?|arms?|grip|gripper) (?:was|were|is|are|being|already|had been)?\s*(?:already )?(?:full|occupied|busy|taken)|full hands?|already (?:held|holding|carrying|hold)|too (?:much|many)(?: things)? in my hands?"),
+        "empty hand": re.compile(r"\b(?:hands?|grip|gripper) (?:was|were|is|are) empty|nothing in my hand"),
+        "far": re.compile(r"\btoo (?:far|distant)|(?:out of|beyond|not (?:within|in)|wasn't (?:within|in)|none (?:is|was) within|isn't within|no [^,.]{0,20} within) (?:my )?reach|can(?:not|'t) reach|couldn't reach|come closer|get closer|not near enough|not close enough"),
+        "stuck": re.compile(r"\b(?:wouldn't|would not|won't|didn't|refused to|does not|doesn't|did not) (?:budge|open|move|give|come open|close|shut)|\b(?:stuck|locked|jammed|sealed|blocked)\b|(?:lifting|opening|closing|shutting|raising|pulling)[^,.]{0,25}(?:was|were|got) (?:refused|rejected|denied|turned down)"),
+        "no room": re.compile(r"\b(?:is|was|were|already) (?:too )?full\b|no (?:room|space|place)\b"),
+        "no action": re.compile(r"\bno (?:such )?(?:valid |known )?action|names? no action|not (?:a|an) (?:valid |known )?action|(?:doesn't|does not|didn't|did not|not) (?:know|recogni[sz]e|understand)"),
+        "done": re.compile(r"\bdone\b(?! with)|\b(?:success|succeeded|successful|all (?:was )?(?:well|fine|right)|went (?:fine|well|through|smoothly)|confirmed)\b"),
+    },
+    task=re.compile(r"\b(?:(?:was|am|been|i'm|i've been|being) (?:only |specifically |explicitly )?(?:asked|told|instructed|ordered|requested|sent)(?: here)? (?:to|for)|(?:task|job|instruction|instructions|request|order|errand|mission|assignment|brief)(?: (?:is|was|says|said|wants me|tells me|told me|asks me|requires me|demands|calls for|only says)| here is)*(?: to| for| that)?(?= (?!done|over|complete|finished))|(?:is|are) (?:supposed|meant) to(?! be (?:in|on|at|here|there|under|inside))(?: be)?|they (?:want|asked)(?: me)?(?: to)?|asked me to|wants me to)"),
+    chores={
+        "heat": (re.compile(r"\b(?:heat(?:ed|ing)?|warm(?:ed|ing)?|cook(?:ed|ing)?|boil(?:ed)?|fry|fried|toast(?:ed)?|bake[d]?|roast(?:ed)?|microwaved)\b"), re.compile(r"heat|warm|cook|boil|fry|toast|bake|roast|\bhot\b|热|煮|烤|煎|加热", re.I)),
+        "use": (re.compile(r"\b(?:play|read|eat|drink|watch|charge|fold|repair|fix|paint|feed|water|iron|decorate|serve|sharpen|unplug|plug in|measure|count|photograph|smell|taste)\b"), re.compile(r"play|read\b|eat|drink|watch|charg|fold|repair|fix|paint|feed|water|iron|decorat|serv|sharpen|plug|measur|count", re.I)),
+        "wash": (re.compile(r"\b(?:wash(?:ed|ing)?|clean(?:ed|ing)?|rins(?:e|ed|ing)|scrub(?:bed)?|wipe[d]?|polish(?:ed)?)\b"), re.compile(r"wash|clean|rins|scrub|wipe|dirty|water|洗|清|擦", re.I)),
+        "slice": (re.compile(r"\b(?:slic(?:e|ed|ing)|cut(?:ting)?|chop(?:ped)?|peel(?:ed)?)\b"), re.compile(r"slic|cut|chop|切", re.I)),
+        "close": (re.compile(r"\b(?:clos(?:e|ed|ing)|shut(?:ting)?)\b"), re.compile(r"clos|shut|关|合", re.I)),
+        "open": (re.compile(r"\bopen(?:ed|ing)?\b"), re.compile(r"open|打开|开|拉", re.I)),
+        "break": (re.compile(r"\b(?:break|broken|smash(?:ed)?|crack(?:ed)?)\b"), re.compile(r"break|broke|smash|crack|打碎|打破", re.I)),
+        "fill": (re.compile(r"\b(?:fill(?:ed)?|pour(?:ed)?|empty it|emptied)\b"), re.compile(r"fill|pour|empty|倒|装", re.I)),
+        "throw": (re.compile(r"\b(?:thrown? (?:away|out|in)|discard(?:ed)?|dispose|bin it)\b"), re.compile(r"throw|discard|dispos|garbage|bin|trash|扔|丢|垃圾", re.I)),
+        "switch": (re.compile(r"\b(?:switch(?:ed)?|turn(?:ed)?) (?:it |them |§ )?(?:on|off)\b"), re.compile(r"switch|turn|light|lamp|toggle|\bon\b|\boff\b|power|lit|dark|run|开|关", re.I)),
+    },
+    rooms={
+        "kitchen": re.compile(r"\b(?:kitchen|kitchenette|pantry|galley)\b(?! §)"),
+        "bathroom": re.compile(r"\b(?:bathroom|washroom|restroom|lavatory|shower room)\b(?! §)"),
+        "bedroom": re.compile(r"\b(?:bedroom|bedchamber|dormitory|sleeping quarters)\b(?! §)"),
+        "living room": re.compile(r"\b(?:living[- ]room|lounge|sitting[- ]room|parlou?r)\b(?! §| chair)"),
+        "other": re.compile(r"\b(?:garage|basement|attic|classroom|hallway|corridor|cellar|garden|laundry room|dining room|library|workshop)\b(?! §)"),
+    },
+    room_in_general=re.compile(r"\b(?:another|other|next|most|any|every|different|usually|normally|typically|often|if|were|not|n't|than|instead|belongs?|rather|would be|outside|towards?|no)\b|\b(?:kitchen|bathroom|bedroom|living room)s\b"),
+    states=(
+        re.compile(rf"{_X}(?: doors?| lid| light)?(?: (?:(?:over )?(?:on|to|off to) (?:my|the) (?:left|right|side)|ahead|in front of me|here|there|itself|nearby))?(?: (?:is|are|hangs?|stands?|stays?|remains?|sits?)|'s|,? with its doors?)(?P<no>n't| not| no longer)?(?: (?:still|already|now|just|also|quite|both|all|currently|clearly|hanging|standing|lying|drawn|pulled|pushed|switched|turned|left|wide|fully|properly|tightly|firmly|brightly|swung|merrily|flung|half|left))* (?:(?P<open>open|ajar|agape|gaping|unlatched)|(?P<closed>shut|closed|sealed|drawn(?= |$|[,.;])(?! back| up| open))|(?P<on>on(?=$|[,.;]| and\b| but\b| again)|lit|burning|running|glowing|blazing|humming|alight|gushing|flowing|dripping|shining|whirring|boiling|brewing|playing)|(?P<off>off(?=$|[,.;]| and\b| but\b| again| now)|out(?=$|[,.;]| and\b)|dark|unlit))\b(?! by\b| up\b|-| to\b| in\b| out of\b)"),
+        re.compile(rf"\b(?:with|and) (?:the|its) {_X}(?: doors?| lid)? (?:still |already |now |standing |hanging |wide )*(?:(?P<open>open|ajar|gaping|agape)|(?P<closed>shut|closed)|(?P<on>lit|running|burning|glowing)|(?P<off>unlit))(?=$|[,.;])(?P<no>(?!))?"),
+    ),
+    poured=re.compile(rf"\bwater(?: is| was|'s)?(?: (?:already|still|now|just|happily|merrily|even))* (?:runs?|running|gush(?:es|ing)|flow(?:s|ing)|pour(?:s|ing)|drip(?:s|ping)|splash(?:es|ing)|stream(?:s|ing)|trickl(?:es|ing)|comes|coming)\b[^,.;]{{0,40}}?(?:from|out of|at) {_D}{_X}"),
+    held=(
+        re.compile(rf"{_X}(?:,? (?:is|are)|'s)?(?: (?:now|still|already|firmly|safely|securely|sitting|resting|lying|nestled|snug|snugly|clutched|tucked|held|tight|gripped|right|here|there|clasped))* (?:in|within|between|under) my (?:(?:left|right|own|other) )?(?:hands?|palms?|grip|grasp|gripper|fingers|fist|arms?|possession|clutches)\b"),
+        re.compile(rf"\b(?:what|the thing|the object|all) (?:that )?i(?:'m|'ve| am| have)?(?: (?:currently|now|actually|still))* (?:hold|holding|carry|carrying|got|have|clutching|gripping)(?: in my hand| with me| here)? is {_D}{_X}"),
+        re.compile(rf"\b(?:i am|i'm|i)(?: (?:now|still|already|currently|also|finally|just|here))* (?:clutching|gripping|grasping|cradling|toting|hugging|lugging|clasping|clutch|grip|cradle)(?: on to| onto)? {_D}{_X}"),
+        re.compile(rf"^(?:and |but |so |now |with )*(?:the |a |an |this |my )?{_X}(?: (?:safely|firmly|securely|already|now|finally))* in (?:hand|my (?:hand|grip|palm))(?=$|[,.;:])"),
+    ),
+    lies_on=(
+        re.compile(rf"{_X}(?: (?:is|are|lies?|sits?|stands?|rests?|hangs?|waits?)|'s)(?: (?:now|still|already|just|right|over|there|also|both|safely|neatly|good|carefully|happily|waiting|calmly|standing|sitting|perched|draped|lying|resting|hanging|balanced|propped|placed|left|leaning|stacked|piled|laid|set|kept|stowed|tucked|parked|slung|spread|mounted|hung))* (?:on|in|inside|over|atop|on top of|upon|within) {_D}{_Y}"),
+        re.compile(rf"{_X}(?: (?:now|still|already|just|right|over|there))* (?:standing|sitting|perched|draped|lying|resting|hanging|balanced|propped|leaning|stacked|piled|parked|slung|waiting) (?:on|in|inside|over|atop|on top of|upon|within) {_D}{_Y}"),
+        re.compile(rf"{_X} was left (?:on|in|inside|over|atop|on top of) {_D}{_Y}"),
+    ),
+    never_seen=(
+        re.compile(rf"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|once|even|ever|actually|so far|already))* (?:seen|laid eyes on|set eyes on|come across|spotted|noticed|sighted|encountered|glimpsed|caught sight of|lay eyes on|see|had sight of|run into|met)(?: (?:a|any|either|sign|trace|of|single|so|much|as|an?))* {_D}{_X}"),
+        re.compile(rf"{_X} (?:has|had|have|'s)(?: (?:still|so far|yet|simply))*(?:n't| not| never| yet)(?: (?:yet|so far|once|ever|even))* (?:to )?(?:shown?(?: (?:itself|up|its face|themselves))?|turned up|appeared|crossed my path|come into (?:view|sight)|surfaced|been (?:seen|spotted|sighted|in view|in sight)|emerged|come up|caught my eye|revealed itself|made an appearance|popped up|met my eyes?)"),
+        re.compile(rf"\bno {_D}{_X} (?:has|had|have)(?: (?:yet|so far|ever))* (?:shown (?:itself|up)|turned up|appeared|crossed my path|come into (?:view|sight)|surfaced|been (?:seen|spotted|sighted)|caught my eye|emerged)"),
+        re.compile(rf"{_X},? (?:which |that |whom )?i(?:'ve| have) (?:not|never|yet to|n't)(?: (?:yet|once|even|ever|so far|actually))* (?:seen|laid eyes on|come across|spotted|noticed|encountered|set eyes on|see)"),
+        re.compile(rf"{_X},? (?:which |that )?i haven't(?: (?:yet|once|even|ever|so far|actually))* (?:seen|laid eyes on|come across|spotted|noticed|encountered|set eyes on|found)"),
+        re.compile(rf"\b(?:i have|i've)(?: (?:so far|yet|still))? (?:seen|spotted|come across|noticed) (?:no|nothing of(?: the| an?)?|no trace of(?: the| an?)?|neither hide nor hair of(?: the| an?)?) {_D}{_X}"),
+        re.compile(rf"\bdoubt (?:that )?(?:i've|i have) ever (?:seen|come across|spotted|noticed) {_D}{_X}"),
+        re.compile(rf"{_X} (?:remains?|is still|is|stays?|has remained) (?:unseen|a mystery to my eyes)"),
+    ),
+    here_only=re.compile(r"\b(?:from here|here|now|in this view|in here|this time|at the moment|currently|right now|since|again|any ?more|up close|clearly|properly|lately|from this|in it|among them|on it|inside it)\b|\b(?:in|on|inside|at|near|by|under|from|behind) (?:the |this |that |any |my |a )?(?:[a-z]+ )?§"),
+    seen_then=(
+        re.compile(rf"\b(?:i|i've|i'd|i have|i had|we)(?: (?:also|already|just|even|first|last|only|did|clearly|do|definitely))* (?:saw|seen|noticed|spotted|caught sight of|glimpsed|came across|observed|made out|remember seeing|recall seeing|remember|recall)(?: (?:also|already))* {_D}{_X}"),
+        re.compile(rf"{_X} (?:was|were|had been|came)(?: (?:there|already|also|clearly|first|last))* (?:in (?:view|sight)|visible|seen|spotted|noticed|into view|into sight)"),
+        re.compile(rf"{_X} (?:that |which )?i (?:saw|noticed|spotted|glimpsed|had seen)"),
+    ),
+    since_here=re.compile(r"\bsince (?:i )?(?:came|coming|arriving|arrived|got|getting|reaching|reached|walking|walked|moving|moved|standing)\b(?: (?:over|up|across|back|here|to|at|in front of|this|that|the|by|near))*"),
+    while_at=(re.compile(rf"\b(?:(?:while|when|as|back when|from when) (?:i was|i stood|i'd been|i had been|standing|over)(?: (?:standing|still|over|back|there|only|just))*(?: (?:at|by|near|beside|next to|in front of|with))+|(?<=§ )from|(?:once|after|when|as|while) (?:i (?:had |was )?)?(?:opening|opened|reaching|reached|getting to|got to|visiting|visited|walking (?:over )?to|walked (?:over )?to|going to|went to|arriving at|arrived at|came to|coming (?:over )?to|pulling back|pulled back|drawing|drew|checking|searching|looking in|looked in|looked into)) {_D}{_Y}"),),
+    only_then=re.compile(r"\b(?:only|first time|not until|for the first time|first saw|first spotted|first noticed)\b"),
+    last_then=re.compile(r"\b(?:last (?:time|saw|seen|spotted|noticed|laid eyes|sight)|last)\b"),
+    not_in_view=(
+        re.compile(rf"\b(?:can't|cannot|can not|don't|do not|couldn't|am unable to|unable to|fail to)(?: (?:yet|currently|even|actually|really|quite))* (?:see|make out|spot|find|notice|detect|discern|pick out|glimpse|identify|locate)(?: (?:a|an|any|the|single|sign|trace|of|glimpse))* {_D}{_XS}(?=$|[,.;!]| (?:anywhere|in (?:this|my|the) (?:view|picture|frame|field|room)|from here|here|at all|in sight|in view|from (?:this|where)|right now|yet|and|or|at the moment|among))"),
+        re.compile(rf"\b(?:no|not a(?: single)?|no sign of(?: an?| any| the)?|no trace of(?: an?| any| the)?|nor(?: an?| any)?) {_D}{_XS} (?:within (?:view|sight)|in (?:sight|view|(?:this|my|the) (?:view|picture|frame|scene|field))|to be seen|anywhere|around here|from here|from (?:where|this)|is (?:in (?:sight|view)|visible|to be seen)|visible|can be seen|at all)"),
+        re.compile(rf"\b(?:there's|there is|i see|i spot|see) no {_D}{_XS}(?=[,.;!]*$)"),
+        re.compile(rf"\bthere (?:isn't|is not|aren't|are not|is) (?:a|an|any|no|one) {_D}{_XS} (?:to be seen|in sight|in view|around|anywhere|here|visible|in this view)"),
+        re.compile(rf"{_XS} (?:is|are|'s)(?:n't| not)? (?:nowhere (?:to be seen|in sight|in view|around)|out of (?:sight|view)|(?:in sight|in view|visible|to be seen|anywhere (?:in sight|to be seen|in view)|around here|missing from view))(?<!'s in view)"),
+        re.compile(rf"\bcan't see {_D}{_XS}(?=$|[,.;!])"),
+        re.compile(rf"{_XS} (?:can't|cannot|can not) be (?:seen|made out|spotted|found|discerned)(?=$|[,.;!]| (?:from|anywhere|at all|here|right now|in this))"),
+        re.compile(rf"{_XS} (?:is|are|'s) nowhere to be found"),
+    ),
+    not_on=(
+        re.compile(rf"\b(?:no|not a|not a single|without a|isn't a|is not a|isn't any|see no) {_D}{_X} (?:on|in|inside|on top of) {_D}{_Y}"),
+    ),
+    perhaps_on=(
+        re.compile(rf"{_X},?[^§,]{{0,45}}?\b(?:in|inside|on|on top of|under|behind|near|by|beside|over by|into|over at|at)\b (?:one of |some |any )?{_D}{_Y}"),
+    ),
+    another=re.compile(r"\b(?:another|second|more|other|else|spare|third|further|extra|also)\b"),
+    seeing_now=(
+        re.compile(rf"\bi (?:can )?(?:(?:clearly|now|also|still|already|even|just) )*(?:see|make out|spot)(?: that| both| now| already)? {_D}{_X}(?! (?:in my mind|being))"),
+        re.compile(rf"\b(?:there's|there is|here's|here is) {_D}{_X} (?:right |just )?(?:here|there|in front of me|beside me|before me|to my (?:left|right)|on my (?:left|right)|ahead|in view|in sight)"),
+        re.compile(rf"{_X} (?:is|are|'s)(?: (?:now|right|clearly|still|just|sitting|standing|lying|plainly|in fact))* (?:visible|in (?:plain |clear |full )?(?:view|sight)|(?:right )?in front of me|before me|right (?:here|there) in front)"),
+    ),
+    beside=(
+        re.compile(rf"{_X} (?:is|are|'s|lies|sits|stands|rests|waits|lying|sitting|standing)(?: (?:right|just|there|lying|sitting|standing|waiting|over))* (?:next to|beside|alongside|close to|by|right by|in front of|between|to the (?:left|right) of) {_D}{_Y}"),
+    ),
+    strangers=re.compile(r"\b(?:washing machine|washer|dishwasher|tumble dryer|dryer|banana|bananas|orange juice|oranges|pear|pears|grape|grapes|lemon|lemons|carrot|carrots|onion|onions|cheese|milk|butter dish|cake|pizza|sandwich|blender|mixer|juicer|rice cooker|air fryer|scissors|hammer|screwdriver|umbrella|backpack|suitcase|handbag|hat|coat|jacket|jeans|trousers|shirt|guitar|piano|violin|radio|printer|camera|fireplace|air conditioner|aquarium|fish tank|cat|dog|bicycle|bike|skateboard|crib|bunk bed|hammock|toothbrush|toothpaste|hairdryer|hair dryer|comb|razor|shampoo|ironing board|ladder|broom|mop|cutting board|chopping board|whisk|corkscrew|teaspoon rack|jewelry box|jewellery box|headphones|game console|bathrobe)\b"),
+    sees=re.compile(r"\b(?:i (?:can )?(?:clearly |also |now |just )?(?:see|spot|notice|saw|make out|spotted|noticed)|there's|there is|there are|there stands|here's|sits|stands|lies|stand|sit|lie|hangs|is (?:standing|sitting|lying|right|hanging|in view|in sight|visible|on my|to my|next to|beside|on the|in the)|catches my eye|in view|in sight)\b"),
+    numbers={"two": 2, "both": 2, "pair of": 2, "couple of": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10, "eleven": 11, "twelve": 12, "a dozen": 12, **{str(n): n for n in range(2, 21)}},
+    counted=re.compile(rf"\b(?P<n>two|pair of|couple of|three|four|five|six|seven|eight|nine|ten|eleven|twelve|a dozen|[2-9]|1\d|20) (?:of )?(?:(?:the|these|those|identical|separate|different|small|large|big|closed|open|shut|whole|matching|ripe|red|green|white|black|brown|wooden|empty|little|more|rolls of|bottles of|bars of|loaves of|pieces of|sheets of|slices of|other|nice|tall|fresh|clean|dirty|neat|shiny) )*{_X}"),
+    only=(
+        re.compile(rf"\b(?:only|just|merely|no more than|nothing but|nothing more than|exactly)(?: (?:see|make out|spot|count|find|the|can|be))* (?:one|a single|a lone|a solitary|the one)(?: (?!of\b)[a-z-]+){{0,2}} {_X}"),
+        re.compile(rf"\b(?:a single|a lone|a solitary|the sole|the lone|the single|one lone|one single|the only|one and only one) (?:[a-z-]+ )?{_X}"),
+        re.compile(rf"\b(?:make out|see|spot|count|find) (?:only |just |no more than )(?:one|a single) (?:[a-z-]+ )?{_X}"),
+    ),
+    only_before=re.compile(r"\b(?:only|just|merely|no more than|nothing more than)(?: (?:see|make out|spot|count|find|the|can|be|those|these))* $"),
+    uncounted=re.compile(r"\b(?:tries|times|steps|metres|meters|minutes|need|want|asked|told|task|opened|searched|checked|visited|tried|places|already|earlier|so far|before|first|left to)\b"),
+    near=re.compile(r"\b(?:(?:right |just )?(?:under|at) my (?:nose|fingertips|elbow|feet|hand)|within (?:arm's|arms'|easy|my|hand's|a hand's|an arm's) (?:reach|length|breadth)|(?:a|an|at) (?:arm's|hand's|hand|arm)[- ]?(?:length|breadth)?(?: away)|inches (?:away|from)|(?:mere |a few |few )?(?:centimet(?:re|er)s|inches) (?:away|off|from)|(?:brushing|touching|pressed|pressing|up) against (?:me|my|my (?:arm|leg|side|elbow))|right (?:next to|beside) me|(?:so |very |really |extremely )close (?:that|i could|to me)|close enough to touch|i could (?:almost )?touch|a step away|just a step|right beside me|within touching distance|almost (?:touching|on top of) me|close at hand|right by my|at close range|on my doorstep|a stone's throw)"),
+    far=re.compile(r"\b(?:way (?:off|over|across)|(?:at|on|in) the (?:other|far|opposite) (?:end|side|corner|wall)(?: of the (?:room|kitchen|bedroom|bathroom|house|place|floor)|(?=$|[,.;]))|(?:clear |all the way |right |clean )?across the (?:room|kitchen|bedroom|bathroom|floor|way)|far (?:away|off|from (?:me|here))|a long (?:way|walk|haul|trek)|quite a (?:way|distance|journey|walk|trek|hike)|(?:several|many|a good few|some|dozens of) (?:met(?:re|er)s|yards|paces|feet|steps) (?:away|off|from)|miles away|in the distance|distant|out of (?:my |arm's |easy )?reach|beyond (?:my |arm's )?reach|too far)"),
+    metres=re.compile(r"\b(?:(?P<n>\d+(?:\.\d+)?|one|two|three|four|five|six|seven|eight|ten|half a) ?(?:m|met(?:re|er)s?)\b)"),
+    compared=re.compile(r"\b(?:than|further|farther|closer|nearer|not|n't|nor|never|journey ahead if|was|were|earlier|get|got|until|before i|hardly far|no longer)\b"),
+    contents=(
+        re.compile(rf"{_Y}(?: (?:over|there|here|on|to|my|the|left|right|ahead|in front of me|itself|of mine))*(?: (?:only|just|already|also|clearly|certainly|surely))* (?:holds?|contains?|houses|is (?:completely |totally |quite |half |already |fully |entirely )?(?:full|stuffed|packed|crammed|filled|stocked|loaded|bursting|empty|bare)|are (?:all |completely |totally |quite |already |fully )?(?:full|stuffed|packed|crammed|filled|stocked|loaded|bursting|empty|bare)|hides|conceals|has (?:nothing|a|an|the|some|only|just|plenty|more|enough|room|space)\b[^,.]{{0,30}}(?: (?:in|inside|within) it| inside| waiting| left| free)?)"),
+        re.compile(rf"\b(?:inside|within|in|under) {_D}{_Y}(?: lid)?,? (?:there's|there is|there are|sits?|lies?|is|are|waits?|i(?:'ll)? find)\b"),
+        re.compile(rf"\b(?:there's|there is|there are) (?:(?!no\b)[a-z-]+ ){{0,3}}(?:{MARK} |nothing |plenty |room |space )?(?:[a-z-]+ ){{0,2}}(?:inside|within|in|under) {_D}{_Y}"),
+        re.compile(rf"\b(?:is|are|sits|lies) (?:all |everything )?(?:there is|that is|that's|there's) (?:in|inside) {_D}{_Y}"),
+        re.compile(rf"{MARK} (?:is|are|'s|sits|lies|waits|hides)(?: (?:right|sitting|lying|waiting|hidden|hiding|safely|tucked away|already|still))* (?:in|inside|within) {_D}{_Y}"),
+        re.compile(rf"\bevery one of {_D}{_Y} is\b"),
+    ),
+    shut=re.compile(rf"\b(?:closed|shut|unopened) {MARK}"),
+)  # fmt: skip
+"""English."""

@@ -1,0 +1,152 @@
+"""Claims that the clause readers judge, in other words than those of the collected thoughts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from support import in_one_test
+
+from er_gym.data.clauses.judging import unknown_sentences
+from er_gym.data.critic import check
+from er_gym.data.knowledge import Knowledge, LastAction
+from er_gym.data.thought import Thought
+from er_gym.data.trajectory import SeenObject, Subgoal
+from er_gym.envs.actions import Action
+
+LIMIT = 200
+
+
+def _acted(verb: str, name: str = "", success: bool = True, feedback: str = "") -> LastAction:
+    action = Action(verb, name)
+    return LastAction(action, "search", success, False, feedback or f"Done: {action}.")
+
+
+DONE = [
+    _acted("navigate to", "Cabinet"),
+    _acted("open", "Cabinet"),
+    _acted("close", "Cabinet"),
+    _acted(
+        "pickup", "Kettle", False, "You cannot pickup Kettle: none is within reach and in view."
+    ),
+    _acted("navigate to", "CounterTop"),
+    _acted("pickup", "Mug"),
+]
+KITCHEN = Knowledge(
+    language="en",
+    instruction="Put the Mug in the Sink.",
+    turn=6,
+    view=[
+        SeenObject(type="CounterTop", side="ahead", distance=0.6),
+        SeenObject(type="Apple", side="left", distance=0.7, on="CounterTop"),
+        SeenObject(type="Apple", side="left", distance=0.8, on="CounterTop"),
+        SeenObject(type="Fridge", side="right", distance=2.4, open=False),
+        SeenObject(type="Faucet", side="ahead", distance=0.9, toggled=False),
+    ],
+    held="Mug",
+    at="CounterTop",
+    seen={
+        "CounterTop": "CounterTop",
+        "Apple": "CounterTop",
+        "Fridge": "CounterTop",
+        "Faucet": "CounterTop",
+        "Bread": "",
+        "Cabinet": "Cabinet",
+        "Kettle": "",
+    },
+    sightings={
+        "CounterTop": ("", "CounterTop"),
+        "Apple": ("CounterTop",),
+        "Fridge": ("CounterTop",),
+        "Faucet": ("CounterTop",),
+        "Bread": ("",),
+        "Cabinet": ("Cabinet",),
+        "Kettle": ("",),
+    },
+    last=DONE[-1],
+    actions=DONE,
+    decision=Action("navigate to", "Sink"),
+    purpose="approach",
+    subgoal=Subgoal(thing="Mug", place="Sink"),
+)
+"""The agent holds a mug at a counter; it opened a cabinet, and could not take a kettle."""
+
+
+def codes(text: str) -> set[str]:
+    known = KITCHEN if text.isascii() else replace(KITCHEN, language="zh")
+    return {each.code for each in check(text, "reasoning", known, limit=LIMIT)}
+
+
+@in_one_test(
+    "case",
+    [
+        ("I got my hands on the kettle earlier without trouble.", "history"),
+        ("I never visited the cabinet.", "history"),
+        ("So far I have not opened anything at all.", "history"),
+        ("I took the mug, and only afterwards did I open the cabinet.", "history"),
+        ("The mug was in my hand before I had even opened the cabinet.", "history"),
+        ("I was told that the kettle was locked in place.", "history"),
+        ("The bread has never shown itself; it may be in the fridge.", "memory"),
+        ("When I was at the cabinet, I noticed the bread.", "memory"),
+        ("There is no apple anywhere in this view.", "unseen"),
+        ("I can see the bread from here.", "unseen"),
+        ("The fridge is packed with food.", "hidden"),
+        ("I see three apples next to each other.", "count"),
+        ("There is only a single apple on the left.", "count"),
+        ("The fridge is within arm's reach of me.", "distance"),
+        ("The apples lie clear across the room.", "distance"),
+        ("This bathroom has what I need.", "room"),
+        ("I was asked to wash the mug before anything else.", "task"),
+        ("Water is pouring out of the faucet.", "state"),
+        ("Perhaps the apple is in the fridge.", "memory"),
+        ("The apple is resting snugly in my palm.", "held"),
+        ("The apple is propped on the fridge.", "support"),
+        ("水壶刚才已经被我拿到了。", "history"),
+        ("橱柜我一次都没打开过。", "history"),
+        ("我先拿了马克杯，后来才开的橱柜。", "history"),
+        ("面包至今没露过面，也许在冰箱里。", "memory"),
+        ("视野里没有苹果。", "unseen"),
+        ("左边只有一个苹果。", "count"),
+        ("冰箱近在咫尺。", "distance"),
+        ("这间卧室挺宽敞的。", "room"),
+        ("任务要我把苹果洗干净。", "task"),
+    ],
+)
+def test_false_claims_are_refused(case: tuple[str, str]) -> None:
+    text, code = case
+    assert code in codes(text)
+
+
+@in_one_test(
+    "text",
+    [
+        "I could not get my hands on the kettle earlier.",
+        "I never visited the fridge.",
+        "I opened the cabinet, and only afterwards did I take the mug.",
+        "The cabinet was opened before I had the mug in my hand.",
+        "The answer was that no kettle was within reach.",
+        "The egg has never shown itself; it may be in the fridge.",
+        "After opening the fridge I will know more.",
+        "There is no bread anywhere in this view.",
+        "The fridge may be packed with food.",
+        "I see two apples next to each other.",
+        "The apples are within arm's reach of me.",
+        "The fridge is over two metres away.",
+        "In most bathrooms there is a towel, but this is a kitchen.",
+        "I was asked to put the mug in the sink before anything else.",
+        "No water is pouring out of the faucet.",
+        "Two bins may stand there, neither of which matters.",
+        "水壶刚才没拿到。",
+        "冰箱我一次都没打开过。",
+        "我先开了橱柜，后来才拿的马克杯。",
+        "鸡蛋至今没露过面，也许在冰箱里。",
+        "左边有两个苹果。",
+        "任务要我把马克杯放进水槽。",
+    ],
+)
+def test_true_claims_stand(text: str) -> None:
+    assert codes(text) == set()
+
+
+def test_sentences_without_a_claim_are_counted_as_unknown() -> None:
+    thought = Thought("How dull. The faucet is off.", "reasoning", LIMIT, KITCHEN)
+    assert unknown_sentences(thought) == (1, 2)
