@@ -56,14 +56,14 @@ def make_app(
         roots: the directories that it may read.
         token: must be given once as ``?token=``; "" where only this machine can connect. Then
             requests must name this machine as their host, as a protection against DNS rebinding.
-        closing: set when the server is to end, so that pages that wait for news let go.
+        closing: set when the server is to end, so that no more runs are read beforehand.
         play: the directory for the runs that a person plays; None if nobody may play.
         vlm_run: the run of a vision-language agent that a person watches, by its name; None for
             one without any options.
     """
     site = Site(Directories(roots if play is None else (*roots, play)))
     closing = closing or threading.Event()
-    playing = PlayPages(site, closing, play, vlm_run)
+    playing = PlayPages(site, play, vlm_run)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -88,10 +88,9 @@ def make_app(
     async def gone(request: Request, error: Exception) -> Response:
         return await run_in_threadpool(site.show, request, "gone.html", {}, 404)
 
-    live = LivePages(site, closing)
     every = (
         RunPages(site), EpisodePages(site), ComparePages(site), TrainingPages(site),
-        DataPages(site), live, StaticPages(),
+        DataPages(site), LivePages(site), StaticPages(),
     )  # fmt: skip
     for pages in every:
         for path, page in pages.routes().items():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
@@ -13,7 +12,6 @@ from starlette.concurrency import run_in_threadpool
 
 from agents import AGENTS
 from agents.zoo.index import PREFIX, model_names
-from benchmarks.monitor.news import news
 from benchmarks.monitor.play.forms import BadForm, Forms
 from benchmarks.monitor.play.plan import plan, playable, run_path
 from benchmarks.monitor.play.session import Order, Refused, Session, SessionState
@@ -43,7 +41,6 @@ KEYS: Mapping[str, str] = {
 """The key that goes to the actions of a verb."""
 _PATIENCE_SECONDS = 25.0
 """How long an answer waits for what was asked for; the page then shows how far it is."""
-_LOOK_SECONDS = 0.15
 _ORDERS: frozenset[str] = frozenset(get_args(Order))
 _FIRST = "mini"
 
@@ -53,7 +50,6 @@ class PlayPages:
 
     Args:
         site: what all pages share.
-        closing: set when the server is to end.
         folder: holds the runs that a person plays; None if nobody may play.
         vlm_run: the run of a vision-language agent that a person watches; see :func:`plan`.
     """
@@ -61,12 +57,10 @@ class PlayPages:
     def __init__(
         self,
         site: Site,
-        closing: threading.Event,
         folder: Path | None,
         vlm_run: Callable[[str], VLMRun] | None = None,
     ) -> None:
         self._site, self._folder, self._vlm_run = site, folder, vlm_run
-        self._closing = closing
         self.sessions = Sessions()
         self._forms = Forms()
 
@@ -76,7 +70,7 @@ class PlayPages:
             "/play": self.choose,
             "/play/{id}": self.show,
             "/play/{id}/picture": self.picture,
-            "/play/{id}/news": self.news,
+            "/play/{id}/version": self.version,
         }
         for path, page in gets.items():
             app.add_api_route(path, page, methods=["GET"], response_class=HTMLResponse)
@@ -216,14 +210,9 @@ class PlayPages:
         picture = pictures[n]
         return Response(picture.data, media_type=picture.media_type)
 
-    async def news(self, request: Request, id: str) -> Response:
-        """Server-sent events: one for each change of a session, with its version."""
-        session = self._session(id)
-
-        async def version() -> int:
-            return session.now.version
-
-        return news(request, self._closing, version, _LOOK_SECONDS, data=lambda number: number)
+    async def version(self, id: str) -> Response:
+        """The version of a session."""
+        return PlainTextResponse(str(self._session(id).now.version))
 
     def _session(self, id: str) -> Session:
         session = self.sessions.get(id)

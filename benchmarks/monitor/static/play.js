@@ -25,16 +25,12 @@ if (board()) {
     for (const details of fresh.querySelectorAll(".played-steps details")) details.open = open.has(details.closest("li").value);
     if (pressed) { const button = fresh.querySelector(`[data-press="${pressed}"]`); if (button) button.focus({ preventScroll: true }); }
   };
-  const renew = async (event) => {
-    if (event && event.data === board().dataset.version) return;
+  const renew = async (version) => {
+    if (version === board().dataset.version) return;
     if (sending) { again = true; return; }
-    try {
-      const answer = await fetch(address, { headers: { Accept: "text/html" } });
-      const text = await answer.text();
-      if (sending) again = true; else await take(text, true);
-    } catch (error) {
-      // The server is away; the stream below says when it is back.
-    }
+    const answer = await fetch(address, { headers: { Accept: "text/html" } });
+    const text = await answer.text();
+    if (sending) again = true; else await take(text, true);
   };
   const send = async (form, submitter) => {
     if (sending) return;
@@ -50,7 +46,7 @@ if (board()) {
       delete board().dataset.busy;
     } finally {
       sending = false;
-      if (again) { again = false; renew(null); }
+      if (again) { again = false; renew("").catch(() => {}); }
     }
   };
   document.addEventListener("submit", (event) => {
@@ -88,5 +84,5 @@ if (board()) {
     if (group) { event.preventDefault(); group.focus(); }
   });
 
-  listen(address + "/news", renew, true);  // of monitor.js
+  follow(address + "/version", board().dataset.version, 250, renew);  // of monitor.js
 }
