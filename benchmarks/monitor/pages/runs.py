@@ -37,6 +37,7 @@ def run_variables(view: RunView, chosen: Filter) -> dict[str, Any]:
         "page": page_of(view.chosen(chosen), chosen.page),
         "groups": groups,
         "types": types,
+        "samples": view.sample_counts(),
         "choices": choices,
         "unknown": chosen.unknown_type(choices["type"]),
         "failures": view.failures,
