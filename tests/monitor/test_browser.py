@@ -143,6 +143,31 @@ def test_news_leave_scrolling_rows_and_selected_text_as_they_are(page, serve, ru
     assert page.evaluate(left) == [150, 1]
 
 
+def test_a_link_of_another_site_with_the_token_opens_the_page(browser, serve, tmp_path):
+    """And a later one without it; but a form of that site is not let in."""
+    address = serve(tmp_path, token="secret").address
+    context = browser.new_context()
+    page = context.new_page()
+    body = ""
+    context.route(
+        "http://elsewhere.example/",
+        lambda route: route.fulfill(content_type="text/html", body=body),
+    )
+    for path, status, body in (
+        ("/data", 403, f"<a href='{address}/data'>go</a>"),
+        ("/", 200, f"<a href='{address}/?token=secret'>go</a>"),
+        ("/data", 200, f"<a href='{address}/data'>go</a>"),
+        ("/play", 403, f"<form method=post action='{address}/play'><button>go</button></form>"),
+    ):
+        with page.expect_response(address + path) as got:
+            page.goto("http://elsewhere.example/")
+            page.click("text=go")
+        assert got.value.status == status, body
+    page.goto(address)
+    assert page.reload().status == 200
+    context.close()
+
+
 def test_filter_slider_keys_and_comparison(page, serve, runs):
     page.goto(serve(runs).address)
     page.click("a:has-text('/random')")

@@ -42,7 +42,7 @@ def ids(runs: Path) -> dict[str, str]:
 def rows(text: str) -> list[str]:
     """The rows of the table of episodes."""
     body = text[text.index('id="rows"') :]
-    return re.findall(r"<tr>\n(.*?)</tr>", body[body.index("<tbody>") :], re.DOTALL)
+    return re.findall(r"<tr[^>]*>\n(.*?)</tr>", body[body.index("<tbody>") :], re.DOTALL)
 
 
 def said(text: str) -> str:
@@ -256,7 +256,12 @@ def test_pages_speak_chinese(client, ids):
 
 def test_another_machine_needs_the_token(runs):
     with TestClient(make_app([runs], "secret"), base_url="http://192.0.2.7:8010") as client:
-        assert client.get("/").status_code == 403
+        refused = client.get("/")
+        assert (refused.status_code, refused.headers["content-type"]) == (
+            403,
+            "text/plain; charset=utf-8",
+        )
+        assert "?token=…" in refused.text
         assert client.get("/", params={"token": "guess"}).status_code == 403
         let_in = client.get("/", params={"token": "secret", "a": "b"}, follow_redirects=False)
         assert (let_in.status_code, let_in.headers["location"]) == (303, "/?a=b")
