@@ -16,6 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from benchmarks.monitor import formats, svg
+from benchmarks.monitor.decided_on import decided_on
 from benchmarks.monitor.directories import Directories, Directory, Kind
 from benchmarks.monitor.episode_view import MOST_TEXT
 from benchmarks.monitor.event_tail import EpisodeRow
@@ -69,7 +70,9 @@ class Site:
             trim_blocks=True,
             lstrip_blocks=True,
         )
-        self._templates.globals.update(svg=svg, query=urlencode, most_text=MOST_TEXT)
+        self._templates.globals.update(
+            svg=svg, query=urlencode, most_text=MOST_TEXT, decided_on=decided_on
+        )
         self._templates.filters.update(formats.FILTERS)
 
     def show(
