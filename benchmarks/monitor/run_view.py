@@ -140,6 +140,8 @@ class RunSummary:
         spent: so far, by the run's ledger; by its replies if it has none.
         decisions_per_second: in the last minute of play.
         seconds_left: by the speed of this start; None if unknown.
+        begun: when its first episode began, seconds since the epoch; 0 if unknown.
+        samples: how often a task was played, at most.
         causes: the causes of unusable replies, a line for each.
         version: changes when anything does.
     """
@@ -155,6 +157,8 @@ class RunSummary:
     spent: Cost
     decisions_per_second: float
     seconds_left: float | None
+    begun: float
+    samples: int
     causes: Sequence[str]
     version: int
 
@@ -238,6 +242,8 @@ class RunView:
             spent=self._spending.spent or _of_replies(rows),
             decisions_per_second=_speed(rows, tail.time),
             seconds_left=left,
+            begun=min((row.begun for row in rows if row.begun), default=tail.begun),
+            samples=max((row.sample for row in rows), default=0),
             causes=self._causes(rows),
             version=tail.version + (self._spending.spent.requests if self._spending.spent else 0),
         )
