@@ -210,8 +210,10 @@ def test_a_person_plays_a_whole_task_to_success(page, serve, runs, tmp_path):
     record = next(iter(RunDirectory.open(runs / "oracle").episodes()))
     page.goto(serve(tmp_path, play=tmp_path / "played").address)
     page.click("text=Play")
-    page.select_option("select[name=suite]", "mini")
-    page.click("button:has-text('Show')")
+    page.select_option("select[name=type]", record.task_type)  # the tasks are those of this type
+    page.wait_for_function(
+        "() => { const n = document.forms.choose.elements.task.length; return n > 1 && n < 50; }"
+    )
     page.select_option("select[name=task]", record.task_id)
     page.click("button.main")
     for number, step in enumerate(record.steps[1:], 1):
@@ -253,6 +255,44 @@ def test_news_that_are_none_do_not_take_the_focus_between_two_keys(page, serve, 
     page.wait_for_timeout(100)
     page.keyboard.press("Enter")
     page.wait_for_selector("p.result.bad")
+
+
+def test_keys_are_kept_while_an_action_is_on_its_way_and_pictures_lie_as_seen(
+    page, serve, tmp_path
+):
+    page.goto(f"{serve(tmp_path, play=tmp_path / 'played').address}/play?suite=mini")
+    page.click("button.main")
+    page.wait_for_selector("button[data-verb=l]")
+    page.keyboard.press("l")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("input[name=step][value='2']", state="attached")
+    page.wait_for_function("() => document.activeElement.value === 'observe'")
+    across = "one => document.querySelector('figure.' + one).getBoundingClientRect().x"
+    left, ahead, right = (page.evaluate(across, one) for one in ("left", "ahead", "right"))
+    assert left < ahead < right
+
+    page.click("figure.right a")
+    page.wait_for_function(
+        "() => document.querySelector('dialog[open] img').getBoundingClientRect().width > 900"
+    )
+    page.keyboard.press("Escape")
+    page.wait_for_selector("dialog", state="detached")
+
+    held: list[Any] = []
+    page.route(
+        re.compile(r"/play/[^/]+$"),
+        lambda route: route.continue_() if held else held.append(route),
+    )
+    page.focus("button[value=observe]")
+    page.keyboard.press("Enter")
+    page.keyboard.press("e")
+    page.keyboard.press("Enter")
+    while not held:
+        page.wait_for_timeout(20)
+    held[0].continue_()
+    page.wait_for_selector("p.result.bad")
+    actions = page.locator(".played-steps b").all_text_contents()
+    assert actions == ["end", "observe", "observe"]
 
 
 def test_it_fits_a_telephone_in_the_dark_and_in_chinese(browser, serve, runs):

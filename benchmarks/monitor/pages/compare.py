@@ -114,7 +114,7 @@ class ComparePages:
                 for directory, run, view in zip(directories, runs, views, strict=True)
             ],
             "parts_at": parts_at,
-            "scripts": ("episode.js",),
+            "scripts": ("episode.js", "enlarge.js"),
         }
         return self._site.show(request, "compare_episode.html", variables)
 

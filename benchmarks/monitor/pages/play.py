@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
+from urllib.parse import urlencode
 
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import HTMLResponse, PlainTextResponse, RedirectResponse
@@ -80,11 +81,13 @@ class PlayPages:
 
     # -- choosing --------------------------------------------------------------------------------
 
-    def choose(self, request: Request, suite: str = _FIRST, type: str = "") -> Response:
+    def choose(
+        self, request: Request, suite: str = _FIRST, type: str = "", agent: str = ""
+    ) -> Response:
         """The choice of what to play."""
         if self._folder is None:
             return self._site.show(request, "play.html", {"on": False, "problem": ""})
-        return self._choice(request, {"suite": suite, "type": type})
+        return self._choice(request, {"suite": suite, "type": type, "agent": agent})
 
     def _choice(
         self, request: Request, given: Mapping[str, str], problem: str = "", status: int = 200
@@ -121,7 +124,9 @@ class PlayPages:
             "sessions": self.sessions.open_now(),
             "folder": self._folder,
         }
-        return self._site.show(request, "play.html", variables, status)
+        return self._site.show(
+            request, "play.html", variables | {"scripts": ("choose.js",)}, status
+        )
 
     async def begin(self, request: Request) -> Response:
         """Begin a session."""
@@ -136,6 +141,9 @@ class PlayPages:
     def _begin(self, request: Request, form: Mapping[str, str]) -> Response:
         assert self._folder is not None
         words = self._site.translator(request)
+        if form.get("do") == "show":  # without JavaScript
+            chosen = {name: form.get(name, "") for name in ("suite", "type", "agent")}
+            return RedirectResponse(f"/play?{urlencode(chosen)}", 303)
         try:
             made = plan(
                 self._folder,
@@ -181,7 +189,7 @@ class PlayPages:
             "problem": problem,
             "secret": self._forms.secret,
             "directory": self._site.directories.at(run, "run"),
-            "scripts": ("play.js",),
+            "scripts": ("play.js", "enlarge.js"),
         }
         return self._site.show(request, "play_session.html", variables, status)
 
