@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
 from fastapi import FastAPI, Request, Response
-from fastapi.responses import HTMLResponse, RedirectResponse
+from fastapi.responses import HTMLResponse, PlainTextResponse, RedirectResponse
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware.base import RequestResponseEndpoint
 
@@ -56,14 +56,14 @@ def make_app(
         roots: the directories that it may read.
         token: must be given once as ``?token=``; "" where only this machine can connect. Then
             requests must name this machine as their host, as a protection against DNS rebinding.
-        closing: set when the server is to end, so that pages that wait for news let go.
+        closing: set when the server is to end, so that no more runs are read beforehand.
         play: the directory for the runs that a person plays; None if nobody may play.
         vlm_run: the run of a vision-language agent that a person watches, by its name; None for
             one without any options.
     """
     site = Site(Directories(roots if play is None else (*roots, play)))
     closing = closing or threading.Event()
-    playing = PlayPages(site, closing, play, vlm_run)
+    playing = PlayPages(site, play, vlm_run)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -88,10 +88,9 @@ def make_app(
     async def gone(request: Request, error: Exception) -> Response:
         return await run_in_threadpool(site.show, request, "gone.html", {}, 404)
 
-    live = LivePages(site, closing)
     every = (
         RunPages(site), EpisodePages(site), ComparePages(site), TrainingPages(site),
-        DataPages(site), live, StaticPages(),
+        DataPages(site), LivePages(site), StaticPages(),
     )  # fmt: skip
     for pages in every:
         for path, page in pages.routes().items():
@@ -105,15 +104,20 @@ def _refusal(request: Request, token: str) -> Response | None:
     if not token:
         host = request.headers.get("host", "")
         name = host.rpartition(":")[0] if host.rpartition(":")[2].isdigit() else host
-        return None if name in _LOOPBACK else Response("ask for 127.0.0.1\n", 403)
+        return None if name in _LOOPBACK else PlainTextResponse("ask for 127.0.0.1\n", 403)
     given = request.query_params.get("token", "")
     if given and hmac.compare_digest(given.encode(), token.encode()):
         left = [(key, value) for key, value in request.query_params.multi_items() if key != "token"]
         query = f"?{urlencode(left)}" if left else ""
         answer = RedirectResponse(f"{request.url.path}{query}", 303)
-        answer.set_cookie(_TOKEN, token, httponly=True, samesite="strict")
+        # Not "strict": then a browser would withhold it where a link of another site led here, from
+        # this redirection on. With "lax" such a link may show a page, as the token in it may; no
+        # other site's form, frame, picture or script is sent it.
+        answer.set_cookie(_TOKEN, token, httponly=True, samesite="lax")
         return answer
     known = request.cookies.get(_TOKEN, "")
     if hmac.compare_digest(known.encode(), token.encode()):
         return None
-    return Response("this address needs the token that er-gym ui printed: add ?token=…\n", 403)
+    return PlainTextResponse(
+        "this address needs the token that er-gym ui printed: add ?token=…\n", 403
+    )

@@ -5,49 +5,65 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import comb
+from statistics import fmean
 from typing import Literal, TypeAlias
 
 from benchmarks.monitor.event_tail import EpisodeRow
-from benchmarks.scoring.metrics import normal
+from benchmarks.scoring.paired import paired_difference
 
 Change: TypeAlias = Literal["gained", "lost", "both", "neither"]
 CHANGES: tuple[Change, ...] = ("gained", "lost", "both", "neither")
-"""Which of two runs a task is a success in: only the second, only the first, both, neither."""
+"""Which of two runs a task succeeds more often in: the second, the first; or in both as often, or
+in neither."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """An episode of two runs.
+    """A task of two runs.
 
     Attributes:
-        key: its name in both.
-        first, second: what each run tells of it.
+        task_id: its id.
+        first, second: what each run tells of its episodes, at least one.
     """
 
-    key: str
-    first: EpisodeRow
-    second: EpisodeRow
+    task_id: str
+    first: Sequence[EpisodeRow]
+    second: Sequence[EpisodeRow]
+
+    @property
+    def rates(self) -> tuple[float, float]:
+        """The share of its episodes that succeeded, in each run."""
+        return fmean(row.success for row in self.first), fmean(row.success for row in self.second)
 
     @property
     def change(self) -> Change:
         """See :data:`CHANGES`."""
-        if self.first.success == self.second.success:
-            return "both" if self.second.success else "neither"
-        return "gained" if self.second.success else "lost"
+        before, after = self.rates
+        if before == after:
+            return "both" if after else "neither"
+        return "gained" if after > before else "lost"
+
+    @property
+    def key(self) -> str:
+        """The name of the first episode that both runs have; "" if there is none."""
+        there = {row.key for row in self.second}
+        return next((row.key for row in self.first if row.key in there), "")
 
 
 @dataclass(frozen=True)
 class Difference:
-    """How much more the second run succeeds, over some pairs.
+    """How much more the second run succeeds, over some tasks. One that was played several times
+    counts with its mean, since its episodes are not independent.
 
     Attributes:
         name: of what was counted.
-        n: pairs; ``counts``: by their change.
+        n: tasks; ``counts``: by their change.
         first, second: success, as fractions.
-        difference, low, high: second - first with its 95 % interval: the mean over pairs and its
-            standard error; None for less than two pairs.
-        chance: the p value of McNemar's exact test: how likely at least so unequal numbers of
-            gained and lost tasks are if neither run is better.
+        difference, low, high: second - first with its 95 % interval
+            (:func:`~benchmarks.scoring.paired.paired_difference`); None for less than two tasks.
+        chance: the p value of the sign test, which is McNemar's exact one where each task was
+            played once: how likely at least so unequal numbers of gained and lost tasks are if
+            neither run is better.
     """
 
     name: str
@@ -62,10 +78,18 @@ class Difference:
 
 
 def pairs_of(first: Mapping[str, EpisodeRow], second: Mapping[str, EpisodeRow]) -> list[Pair]:
-    """The episodes that have come out in both runs; those that crashed are failures, as everywhere
+    """The tasks that have come out in both runs; episodes that crashed are failures, as everywhere
     (:mod:`er_gym.rollout.outcomes`)."""
-    found = ((key, row.result, second[key].result) for key, row in first.items() if key in second)
-    return [Pair(key, one, other) for key, one, other in found if one and other]
+    one, other = _by_task(first), _by_task(second)
+    return [Pair(task, rows, other[task]) for task, rows in one.items() if task in other]
+
+
+def _by_task(rows: Mapping[str, EpisodeRow]) -> dict[str, list[EpisodeRow]]:
+    found: dict[str, list[EpisodeRow]] = {}
+    for row in rows.values():
+        if row.result is not None:
+            found.setdefault(row.task_id, []).append(row.result)
+    return {task: sorted(several, key=lambda row: row.sample) for task, several in found.items()}
 
 
 def difference(name: str, pairs: Sequence[Pair]) -> Difference:
@@ -73,19 +97,22 @@ def difference(name: str, pairs: Sequence[Pair]) -> Difference:
     counts: dict[Change, int] = dict.fromkeys(CHANGES, 0)
     for pair in pairs:
         counts[pair.change] += 1
-    n = len(pairs)
-    gained, lost = counts["gained"], counts["lost"]
-    every = normal([1.0] * gained + [-1.0] * lost + [0.0] * (n - gained - lost) or [0.0])
+    rates = [pair.rates for pair in pairs] or [(0.0, 0.0)]
+    mean, low, high = 0.0, None, None
+    if pairs:
+        before = [row for pair in pairs for row in pair.first]
+        estimate = paired_difference(before, [row for pair in pairs for row in pair.second])
+        mean, low, high = estimate.mean, estimate.low, estimate.high
     return Difference(
         name=name,
-        n=n,
+        n=len(pairs),
         counts=counts,
-        first=(counts["both"] + lost) / n if n else 0.0,
-        second=(counts["both"] + gained) / n if n else 0.0,
-        difference=every.mean,
-        low=None if every.low is None else max(-1.0, every.low),
-        high=None if every.high is None else min(1.0, every.high),
-        chance=mcnemar(gained, lost),
+        first=fmean(before for before, _ in rates),
+        second=fmean(after for _, after in rates),
+        difference=mean,
+        low=None if low is None else max(-1.0, low),
+        high=None if high is None else min(1.0, high),
+        chance=mcnemar(counts["gained"], counts["lost"]),
     )
 
 
@@ -93,12 +120,12 @@ def by_type(pairs: Sequence[Pair]) -> list[Difference]:
     """The difference for each task type."""
     types: dict[str, list[Pair]] = {}
     for pair in pairs:
-        types.setdefault(pair.second.task_type, []).append(pair)
+        types.setdefault(pair.second[0].task_type, []).append(pair)
     return [difference(name, types[name]) for name in sorted(types)]
 
 
 def mcnemar(gained: int, lost: int) -> float:
-    """The p value of McNemar's exact test, two-sided."""
+    """The p value of the two-sided sign test, McNemar's exact one for pairs of successes."""
     changed, fewer = gained + lost, min(gained, lost)
     tail = sum(comb(changed, k) for k in range(fewer + 1))
     return min(1.0, 2 * tail / 2**changed)

@@ -13,6 +13,7 @@ from pydantic_core import from_json
 from benchmarks.monitor.line_tail import LineFollower, Lines
 from er_gym.rollout.causes import EpisodeCauses
 from er_gym.rollout.outcomes import succeeded
+from er_gym.rollout.records import sample_of_key, task_of_key
 
 _LINE = re.compile(
     rb'(?:\{"time":([0-9.e+-]+),"kind":"step","task_id":"([^"]*)","step":([0-9]+),"verb":"([^"]*)",'
@@ -58,6 +59,16 @@ class EpisodeRow:
     last: str = ""
     causes: EpisodeCauses | None = None
     before: EpisodeRow | None = None
+
+    @property
+    def task_id(self) -> str:
+        """The task that was played."""
+        return task_of_key(self.key)
+
+    @property
+    def sample(self) -> int:
+        """Which of the task's episodes it is, from 1."""
+        return sample_of_key(self.key)
 
     @property
     def result(self) -> EpisodeRow | None:

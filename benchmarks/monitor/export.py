@@ -51,7 +51,7 @@ from er_gym.writing import MARKDOWN_MARK, CannotWrite, make_folder, replaced, wr
 INDEX, EPISODES, PICTURES = "index.html", "episodes", "pictures"
 USUAL_EPISODES = 20
 """So many replays are put into a file unless another number is asked for."""
-_STYLES, _SCRIPTS = ("monitor.css", "charts.css"), ("export.js", "episode.js")
+_STYLES, _SCRIPTS = ("monitor.css", "charts.css"), ("export.js", "episode.js", "enlarge.js")
 _MOST_TEXT = 500
 _END_OF_TITLE = "<!-- the end of the title -->"
 """Cannot stand in a title, in which ``<`` is escaped."""

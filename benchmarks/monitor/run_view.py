@@ -16,9 +16,9 @@ from benchmarks.monitor.listing import AddressFilter
 from benchmarks.monitor.record_rows import RecordRows
 from benchmarks.monitor.spending_tail import SpendingTail
 from benchmarks.scoring.metrics import success_rate
+from benchmarks.scoring.samples import TaskSamples, group_by, most_samples, task_samples
 from er_gym.rollout.causes import count_causes
 from er_gym.rollout.events import EVENTS, Cost
-from er_gym.rollout.records import task_of_key
 from er_gym.rollout.run_directory import SPENDING, Manifest, RunDirectory, RunDirectoryError
 from er_gym.tasks.types import task_type
 
@@ -119,9 +119,9 @@ class SuccessCount:
     @staticmethod
     def of(name: str, rows: Iterable[EpisodeRow]) -> SuccessCount:
         """Count the episodes of a run."""
-        told = [(row.key, row.result) for row in rows]
+        told = [row.result for row in rows]
         return SuccessCount.over(
-            name, [(task_of_key(key), row.success) for key, row in told if row is not None]
+            name, [(row.task_id, row.success) for row in told if row is not None]
         )
 
 
@@ -140,6 +140,8 @@ class RunSummary:
         spent: so far, by the run's ledger; by its replies if it has none.
         decisions_per_second: in the last minute of play.
         seconds_left: by the speed of this start; None if unknown.
+        begun: when its first episode began, seconds since the epoch; 0 if unknown.
+        samples: how often a task was played, at most.
         causes: the causes of unusable replies, a line for each.
         version: changes when anything does.
     """
@@ -155,6 +157,8 @@ class RunSummary:
     spent: Cost
     decisions_per_second: float
     seconds_left: float | None
+    begun: float
+    samples: int
     causes: Sequence[str]
     version: int
 
@@ -238,6 +242,8 @@ class RunView:
             spent=self._spending.spent or _of_replies(rows),
             decisions_per_second=_speed(rows, tail.time),
             seconds_left=left,
+            begun=min((row.begun for row in rows if row.begun), default=tail.begun),
+            samples=max((row.sample for row in rows), default=0),
             causes=self._causes(rows),
             version=tail.version + (self._spending.spent.requests if self._spending.spent else 0),
         )
@@ -263,6 +269,18 @@ class RunView:
             [SuccessCount.of(name, rows) for name, rows in by_group.items()],
             [SuccessCount.of(name, rows) for name, rows in sorted(by_type.items())],
         )
+
+    def sample_counts(self) -> list[tuple[str, TaskSamples]]:
+        """Success by task, over all ("") and by group; empty if each was played once."""
+        ended = [row.result for row in self._rows.values() if row.result is not None]
+        samples = most_samples(ended)
+        if samples < 2:
+            return []
+        by_group = group_by(ended, lambda row: _group(row.task_type))
+        found = [
+            (name, task_samples(rows, samples)) for name, rows in {"": ended, **by_group}.items()
+        ]
+        return [(name, counted) for name, counted in found if counted is not None]
 
     def choices(self) -> dict[str, list[str]]:
         """The values by which rows can be filtered."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from benchmarks.monitor import formats, svg
+from benchmarks.monitor.decided_on import decided_on
 from benchmarks.monitor.directories import Directories, Directory, Kind
 from benchmarks.monitor.episode_view import MOST_TEXT
 from benchmarks.monitor.event_tail import EpisodeRow
@@ -32,8 +34,9 @@ LANGUAGE = "er-gym-language"
 AN_HOUR = {"Cache-Control": "private, max-age=3600"}
 """For what does not change: pictures."""
 
-_COUNT_SECONDS = 0.3
-"""How long failures are counted at a time, while a page waits for news."""
+_COUNT_SECONDS = 0.1
+"""How long failures are counted at a time, while a page waits."""
+_MOST_ASKED = 2000
 
 
 class NotFound(Exception):
@@ -67,7 +70,9 @@ class Site:
             trim_blocks=True,
             lstrip_blocks=True,
         )
-        self._templates.globals.update(svg=svg, query=urlencode, most_text=MOST_TEXT)
+        self._templates.globals.update(
+            svg=svg, query=urlencode, most_text=MOST_TEXT, decided_on=decided_on
+        )
         self._templates.filters.update(formats.FILTERS)
 
     def show(
@@ -78,11 +83,14 @@ class Site:
         Args:
             request: asks for it.
             template: its file.
-            variables: the template's variables; ``live`` is what the page wants news of.
+            variables: the template's variables; ``live`` is what the page wants to
+                hear of, as :meth:`state_of` takes it.
             status: of the answer.
         """
         here = request.url.path + (f"?{request.url.query}" if request.url.query else "")
-        return HTMLResponse(self.page(template, variables, self.translator(request), here), status)
+        live = variables.get("live", "")
+        told = {"state": self.state_of(live), **variables} if live else variables
+        return HTMLResponse(self.page(template, told, self.translator(request), here), status)
 
     def page(
         self,
@@ -107,7 +115,7 @@ class Site:
             there = link(address)
             return Markup("") if there is None else Markup(' {}="{}"').format(attribute, there)
 
-        shared = {"live": "", "scripts": (), "at": "", "exported": None, "to": to}
+        shared = {"live": "", "state": "", "scripts": (), "at": "", "exported": None, "to": to}
         return self._templates.get_template(template).render(
             {**shared, **variables, "t": t, "here": here}
         )
@@ -149,7 +157,7 @@ class Site:
     def failures(self, directory: Directory) -> FailureCounts:
         """Why a run's episodes failed, as far as that has been counted."""
         with self.runs.use(directory) as view:
-            view.count_failures(_COUNT_SECONDS / 3)
+            view.count_failures(_COUNT_SECONDS)
             return deepcopy(view.failures)
 
     def version(self, directory: Directory, closely: bool = False) -> object:
@@ -166,6 +174,21 @@ class Site:
                 view.count_failures(_COUNT_SECONDS)
             summary = view.summary()
             return summary.version, summary.state, view.failures.done
+
+    def state_of(self, of: str, closely: bool = False) -> str:
+        """What changes whenever some directories do, 16 hex digits.
+
+        Args:
+            of: the ids of directories, with commas between, or ``*`` for all.
+            closely: whether more is read meanwhile of why their episodes failed.
+        """
+        asked = frozenset(of[:_MOST_ASKED].split(","))
+        told = [
+            (directory.id, self.version(directory, closely=closely and directory.id in asked))
+            for directory in self.directories.all()
+            if "*" in asked or directory.id in asked
+        ]
+        return hashlib.sha256(repr(told).encode()).hexdigest()[:16]
 
     def record(self, id: str, key: str) -> tuple[EpisodeRecord, Manifest]:
         """An episode's record, and its run's manifest.

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from benchmarks.scoring.metrics import Estimate, Score, normal
+from benchmarks.scoring.samples import Sampled
 
 
 def paired_difference(
-    before: Sequence[Score], after: Sequence[Score], metric: str = "success"
+    before: Sequence[Sampled], after: Sequence[Sampled], metric: str = "success"
 ) -> Estimate:
     """The mean difference of a metric with its 95 % interval, paired over tasks.
 
@@ -17,7 +18,7 @@ def paired_difference(
 
     Args:
         before, after: the scores of two runs of the same suite.
-        metric: a field of :class:`~benchmarks.scoring.metrics.Score`.
+        metric: a field of :class:`~benchmarks.scoring.metrics.Score`, or of what these are.
 
     Raises:
         ValueError: the runs have no task in common.
@@ -52,7 +53,7 @@ def paired_change(
     return normal([(other_after[t] - other_before[t]) - (after[t] - before[t]) for t in common])
 
 
-def _by_task(scores: Sequence[Score], metric: str) -> dict[str, float]:
+def _by_task(scores: Sequence[Sampled], metric: str) -> dict[str, float]:
     found: dict[str, list[float]] = {}
     for each in scores:
         found.setdefault(each.task_id, []).append(float(getattr(each, metric)))

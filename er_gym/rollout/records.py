@@ -29,7 +29,7 @@ ERROR = "error"
 GAVE_UP = "gave up"
 """Why an episode ended that the agent could not finish."""
 
-_SAMPLE = re.compile(r"\.sample[1-9]\d*\Z")
+_SAMPLE = re.compile(r"\.sample([1-9]\d*)\Z")
 
 PERSON: Final = "person"
 """Who decided a step in place of the agent."""
@@ -72,6 +72,12 @@ def episode_key(task_id: str, sample: int = 1) -> str:
 def task_of_key(key: str) -> str:
     """The id of the task whose episode has a key (:func:`episode_key`)."""
     return _SAMPLE.sub("", key)
+
+
+def sample_of_key(key: str) -> int:
+    """Which of its task's episodes has a key (:func:`episode_key`), from 1."""
+    found = _SAMPLE.search(key)
+    return int(found[1]) if found else 1
 
 
 class KeyActionRecord(_Record):

@@ -15,17 +15,19 @@ from contextlib import redirect_stderr
 from pathlib import Path
 
 import pytest
+from fastapi.testclient import TestClient
 from sampled_agents import TASKS
 from unsteady_agent import CRASHES
 
 from benchmarks.cli import main as cli
+from benchmarks.monitor.app import make_app
 from benchmarks.monitor.comparison import difference, pairs_of
 from benchmarks.monitor.directories import Directories
 from benchmarks.monitor.export import ExportRequest, export
 from benchmarks.monitor.run_view import RunView
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.paired import paired_difference
-from benchmarks.scoring.report import RunReport, load_run, slices
+from benchmarks.scoring.report import RunReport, load_run, sample_slices, slices
 from benchmarks.scoring.scorers import CORRECTED, SCORERS
 from er_gym.rollout.events import EVENTS, read_events
 from er_gym.rollout.outcomes import Outcomes
@@ -166,9 +168,25 @@ def test_a_comparison_counts_as_the_reports_do(run: Path, er_gym: Command) -> No
     found = difference("", pairs_of(*rows))
     reports: list[RunReport] = [load_run(each) for each in (run, other)]
     paired = paired_difference(*(each.scores[CORRECTED.name] for each in reports))
-    assert found.n == 6
+    assert found.n == 3  # tasks, each played twice
     assert (found.first, found.second) == (pytest.approx(told(run)[1]), 1.0)
     assert found.difference == pytest.approx(paired.mean)
+    assert (found.low, found.high) == (paired.low, pytest.approx(min(paired.high or 1.0, 1.0)))
+    assert sum(found.counts.values()) == 3
+
+
+def test_a_run_with_samples_tells_pass_at_k_as_the_report_does(run: Path) -> None:
+    view = RunView(Directories([run]).of_kind("run")[0])
+    view.read()
+    scores = load_run(run).scores[CORRECTED.name]
+    expected = {name if level == "group" else "": counted
+                for level, name, counted in sample_slices(scores) if level != "type"}  # fmt: skip
+    assert dict(view.sample_counts()) == expected
+    client = TestClient(make_app([run]), base_url="http://127.0.0.1")
+    (row,) = client.get("/").text.split("<tbody>")[1].split("</tbody>")[:1]
+    page = client.get(re.findall(r'href="(/runs/\w+)"', row)[0]).text
+    assert "pass@2" in page
+    assert page.count(">sample 1<") == page.count(">sample 2<") == 3
 
 
 @in_one_test("name", SCORERS)

@@ -56,11 +56,13 @@ def visit() -> Iterator[Visit]:
 class Server:
     """The monitor over a folder, on a port of this machine."""
 
-    def __init__(self, folder: Path, port: int = 0, play: Path | None = None) -> None:
+    def __init__(
+        self, folder: Path, port: int = 0, play: Path | None = None, token: str = ""
+    ) -> None:
         listener = socket.create_server(("127.0.0.1", port))
         self.port: int = listener.getsockname()[1]
         self._closing = threading.Event()
-        app = make_app([folder], closing=self._closing, play=play)
+        app = make_app([folder], token, closing=self._closing, play=play)
         config = uvicorn.Config(app, log_level="error", access_log=False)
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._server.run, args=([listener],))
@@ -93,8 +95,8 @@ def serve() -> Iterator[Callable[..., Server]]:
     """Starts servers that end with the test."""
     started: list[Server] = []
 
-    def serve(folder: Path, port: int = 0, play: Path | None = None) -> Server:
-        started.append(Server(folder, port, play))
+    def serve(folder: Path, port: int = 0, play: Path | None = None, token: str = "") -> Server:
+        started.append(Server(folder, port, play, token))
         return started[-1]
 
     yield serve

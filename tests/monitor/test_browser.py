@@ -107,6 +107,67 @@ def test_a_run_fills_by_itself_though_run_and_server_are_killed(page, serve, tmp
             process.wait()
 
 
+def test_twenty_open_pages_are_served_and_all_are_renewed(page, serve, runs, tmp_path):
+    """A browser has six connections to a server: no page may keep one."""
+    address = serve(tmp_path).address
+    pages = [page, *(page.context.new_page() for _ in range(19))]
+    for each in pages:
+        each.goto(address, timeout=20_000)
+    shutil.copytree(runs / "random", tmp_path / "late")
+    for each in pages:
+        each.wait_for_selector("a:has-text('/late')", timeout=20_000)
+
+
+def test_news_leave_scrolling_rows_and_selected_text_as_they_are(page, serve, runs, tmp_path):
+    shutil.copytree(runs / "random", tmp_path / "m")
+    page.set_viewport_size({"width": 400, "height": 700})
+    page.goto(serve(tmp_path).address)
+    page.evaluate("document.querySelector('.scroll').scrollLeft = 150")
+    page.evaluate("window.row = document.querySelector('tbody tr')")
+    shutil.copytree(runs / "oracle", tmp_path / "a")
+    page.wait_for_selector("tbody tr:nth-child(1) a:has-text('/a')")
+    left = "() => [document.querySelector('.scroll').scrollLeft, row.rowIndex]"
+    assert page.evaluate(left) == [150, 2]
+
+    page.evaluate("getSelection().selectAllChildren(row.querySelector('a'))")
+    shutil.rmtree(tmp_path / "a")
+    with page.expect_event("requestfinished", lambda one: one.url == page.url):
+        pass
+    page.wait_for_timeout(100)
+    assert page.evaluate("getSelection().toString()").endswith("/m")
+    assert page.evaluate(left) == [150, 2], "it waits"
+    page.evaluate("getSelection().empty()")
+    page.wait_for_function(
+        "() => row.rowIndex === 1 && document.querySelectorAll('tr').length === 2"
+    )
+    assert page.evaluate(left) == [150, 1]
+
+
+def test_a_link_of_another_site_with_the_token_opens_the_page(browser, serve, tmp_path):
+    """And a later one without it; but a form of that site is not let in."""
+    address = serve(tmp_path, token="secret").address
+    context = browser.new_context()
+    page = context.new_page()
+    body = ""
+    context.route(
+        "http://elsewhere.example/",
+        lambda route: route.fulfill(content_type="text/html", body=body),
+    )
+    for path, status, body in (
+        ("/data", 403, f"<a href='{address}/data'>go</a>"),
+        ("/", 200, f"<a href='{address}/?token=secret'>go</a>"),
+        ("/data", 200, f"<a href='{address}/data'>go</a>"),
+        ("/play", 403, f"<form method=post action='{address}/play'><button>go</button></form>"),
+    ):
+        with page.expect_response(address + path) as got:
+            page.goto("http://elsewhere.example/")
+            page.click("text=go")
+        assert got.value.status == status, body
+    page.goto(address)
+    assert page.reload().status == 200
+    context.close()
+
+
 def test_filter_slider_keys_and_comparison(page, serve, runs):
     page.goto(serve(runs).address)
     page.click("a:has-text('/random')")
@@ -149,8 +210,10 @@ def test_a_person_plays_a_whole_task_to_success(page, serve, runs, tmp_path):
     record = next(iter(RunDirectory.open(runs / "oracle").episodes()))
     page.goto(serve(tmp_path, play=tmp_path / "played").address)
     page.click("text=Play")
-    page.select_option("select[name=suite]", "mini")
-    page.click("button:has-text('Show')")
+    page.select_option("select[name=type]", record.task_type)  # the tasks are those of this type
+    page.wait_for_function(
+        "() => { const n = document.forms.choose.elements.task.length; return n > 1 && n < 50; }"
+    )
     page.select_option("select[name=task]", record.task_id)
     page.click("button.main")
     for number, step in enumerate(record.steps[1:], 1):
@@ -178,28 +241,58 @@ def test_a_person_plays_a_whole_task_to_success(page, serve, runs, tmp_path):
 
 
 def test_news_that_are_none_do_not_take_the_focus_between_two_keys(page, serve, tmp_path):
-    """The page asks for itself when it opens; the answer comes after the first of two keys."""
+    """The page hears of another version after the first of two keys, and finds the same."""
     held: list[Any] = []
-
-    def hold(route: Any) -> None:
-        if route.request.resource_type == "fetch" and route.request.method == "GET":
-            held.append(route)
-        else:
-            route.continue_()
-
     page.goto(f"{serve(tmp_path, play=tmp_path / 'played').address}/play?suite=mini")
-    page.route(re.compile(r"/play/[^/?]+$"), hold)
     page.click("button.main")
     page.wait_for_selector("button[data-verb=e]")
-    page.wait_for_timeout(300)
-    assert held
+    page.route(re.compile(r"/version$"), lambda route: held.append(route))
+    while not held:
+        page.wait_for_timeout(20)
     page.keyboard.press("e")
-    for each in held:
-        with page.expect_event("requestfinished"):
-            each.continue_()
-    page.wait_for_timeout(300)
+    with page.expect_event("requestfinished", lambda one: re.search(r"/play/[^/]+$", one.url)):
+        held[0].fulfill(body="another")
+    page.wait_for_timeout(100)
     page.keyboard.press("Enter")
     page.wait_for_selector("p.result.bad")
+
+
+def test_keys_are_kept_while_an_action_is_on_its_way_and_pictures_lie_as_seen(
+    page, serve, tmp_path
+):
+    page.goto(f"{serve(tmp_path, play=tmp_path / 'played').address}/play?suite=mini")
+    page.click("button.main")
+    page.wait_for_selector("button[data-verb=l]")
+    page.keyboard.press("l")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("input[name=step][value='2']", state="attached")
+    page.wait_for_function("() => document.activeElement.value === 'observe'")
+    across = "one => document.querySelector('figure.' + one).getBoundingClientRect().x"
+    left, ahead, right = (page.evaluate(across, one) for one in ("left", "ahead", "right"))
+    assert left < ahead < right
+
+    page.click("figure.right a")
+    page.wait_for_function(
+        "() => document.querySelector('dialog[open] img').getBoundingClientRect().width > 900"
+    )
+    page.keyboard.press("Escape")
+    page.wait_for_selector("dialog", state="detached")
+
+    held: list[Any] = []
+    page.route(
+        re.compile(r"/play/[^/]+$"),
+        lambda route: route.continue_() if held else held.append(route),
+    )
+    page.focus("button[value=observe]")
+    page.keyboard.press("Enter")
+    page.keyboard.press("e")
+    page.keyboard.press("Enter")
+    while not held:
+        page.wait_for_timeout(20)
+    held[0].continue_()
+    page.wait_for_selector("p.result.bad")
+    actions = page.locator(".played-steps b").all_text_contents()
+    assert actions == ["end", "observe", "observe"]
 
 
 def test_it_fits_a_telephone_in_the_dark_and_in_chinese(browser, serve, runs):

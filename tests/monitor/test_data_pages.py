@@ -63,7 +63,9 @@ def said(text: str) -> str:
 
 
 def rows(text: str) -> list[str]:
-    return re.findall(r"<tr>\n<td><a href=.*?</tr>", text[text.index('id="rows"') :], re.DOTALL)
+    return re.findall(
+        r"<tr[^>]*>\n<td><a href=.*?</tr>", text[text.index('id="rows"') :], re.DOTALL
+    )
 
 
 def same(index: CollectionIndex, collection: Collection) -> None:
@@ -171,6 +173,11 @@ def test_a_trajectory_is_shown_turn_by_turn(client, address, collection):
     assert text.count("not learnt") == 1
     assert html.escape(second.id) in page.text  # the next one
     pictures = [picture for turn in first.turns for picture in turn.pictures]
+    beside = re.findall(r'data-step="(\d+)" data-pictures="([\d,]+)" data-stand="(\d+)"', page.text)
+    assert [int(stand) for _, _, stand in beside] == list(range(first.actions))
+    for step, numbers, _ in beside:  # the pictures that the turn was decided on
+        own = first.turns[int(step)].pictures
+        assert [pictures[int(each)] for each in numbers.split(",")] == own
     got = client.get(f"{address}/picture", params={"key": first.id, "n": 0})
     assert got.content == (collection.path / pictures[0].path).read_bytes()
     assert got.headers["content-type"] == "image/jpeg"

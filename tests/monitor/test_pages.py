@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import json
 import re
 import shutil
 import threading
@@ -42,7 +43,7 @@ def ids(runs: Path) -> dict[str, str]:
 def rows(text: str) -> list[str]:
     """The rows of the table of episodes."""
     body = text[text.index('id="rows"') :]
-    return re.findall(r"<tr>\n(.*?)</tr>", body[body.index("<tbody>") :], re.DOTALL)
+    return re.findall(r"<tr[^>]*>\n(.*?)</tr>", body[body.index("<tbody>") :], re.DOTALL)
 
 
 def said(text: str) -> str:
@@ -244,6 +245,30 @@ def test_runs_are_compared_task_by_task(client, ids, runs):
     assert client.get("/compare", params={"of": ["nothing"]}).status_code == 404
 
 
+def test_settings_are_shown_and_compared_runs_that_were_not_played_alike_are_named(
+    runs, tmp_path, visit
+):
+    folder = shutil.copytree(runs / "random", tmp_path / "random")
+    shutil.copytree(runs / "oracle", tmp_path / "oracle")
+    told = json.loads((folder / "run.json").read_text())
+    told["env"] |= {"instances": "explore", "faults": 0.2, "width": 640}
+    (folder / "run.json").write_text(json.dumps(told))
+    client = visit(tmp_path)
+    ids = {each.path.name: each.id for each in Directories([tmp_path]).all()}
+    page = " ".join(said(client.get(f"/runs/{ids['oracle']}").text).split())
+    for setting in ("env.instances target", "env.protocol default", "env.faults 0.0", "seed 0",
+                    "er_gym 0.", "scorer corrected", "env.obs_mode text"):  # fmt: skip
+        assert setting in page
+    assert re.search(r"begun 20\d\d-", page)
+    both = client.get("/compare", params={"of": [ids["random"], ids["oracle"]]})
+    text = " ".join(said(both.text).split())
+    assert "not played alike: env.instances, env.faults. So" in text
+    assert "env.width 640 800" in text
+    assert "seed 0 0" not in text
+    alike = client.get("/compare", params={"of": [ids["oracle"], ids["oracle"]]})
+    assert "not played alike" not in alike.text
+
+
 def test_pages_speak_chinese(client, ids):
     chosen = client.get("/language/zh", params={"back": f"/runs/{ids['oracle']}"})
     assert chosen.status_code == 303
@@ -256,7 +281,12 @@ def test_pages_speak_chinese(client, ids):
 
 def test_another_machine_needs_the_token(runs):
     with TestClient(make_app([runs], "secret"), base_url="http://192.0.2.7:8010") as client:
-        assert client.get("/").status_code == 403
+        refused = client.get("/")
+        assert (refused.status_code, refused.headers["content-type"]) == (
+            403,
+            "text/plain; charset=utf-8",
+        )
+        assert "?token=…" in refused.text
         assert client.get("/", params={"token": "guess"}).status_code == 403
         let_in = client.get("/", params={"token": "secret", "a": "b"}, follow_redirects=False)
         assert (let_in.status_code, let_in.headers["location"]) == (303, "/?a=b")

@@ -21,6 +21,7 @@ from agents.vlm.clients.scripted import ScriptedClient
 from agents.vlm.record import ConversationRecord, RoundRecord
 from benchmarks.cli.main import main
 from benchmarks.monitor.app import make_app
+from benchmarks.monitor.formats import plainly
 from benchmarks.monitor.language import words_in
 from benchmarks.monitor.play.plan import plan, run_path
 from benchmarks.monitor.play.session import Refused
@@ -137,6 +138,33 @@ def conversation(run: RunDirectory, task_id: str) -> ConversationRecord:
     return ConversationRecord.model_validate_json(file.read_bytes())
 
 
+def test_what_is_chosen_is_begun_and_no_other_type(player: Player) -> None:
+    """Suite, type and task are of one form; what does not fit together is refused."""
+    page = player.get(f"/play?suite=mini&type={TYPE}")
+    assert page.count("<form") == 1
+    other = "single_search"
+    wrong = player.post("/play", suite="mini", type=other, task=FIRST.id)
+    assert (wrong.status_code, f"of the types {other}" in wrong.text) == (400, True)
+    shown = player.post("/play", do="show", suite="mini", type=TYPE, agent="oracle")
+    assert shown.headers["location"] == f"/play?suite=mini&type={TYPE}&agent=oracle"
+    page = player.get(shown.headers["location"])
+    assert 'value="oracle"' in page
+    assert FIRST.id in page
+    assert page.count("<option value=") < 60
+
+
+def test_feedback_for_a_person_names_types() -> None:
+    for said, plain in (
+        ("Bread_9e2edca9 is blocking Agent 0 from moving by (0.0000, 0.0000, -0.1000).",
+         "Bread is blocking you from moving."),
+        ("No valid positions to place Statue: SideTable|+11.38|+00.00|-01.16 has no free space.",
+         "No valid positions to place Statue: SideTable has no free space."),
+        ("Sink|-01.00|+00.50|+02.25|SinkBasin is full.", "Sink is full."),
+        ("Done: navigate to Cabinet_2.", "Done: navigate to Cabinet_2."),
+    ):  # fmt: skip
+        assert plainly(said) == plain
+
+
 def test_playing_leaves_the_run_that_bench_writes(
     player: Player,
     oracle_actions: list[str],
@@ -243,7 +271,7 @@ def test_a_step_decided_in_place_of_a_model_is_its_own_turn(
     assert len(sent) == 1
     page = player.get(session)
     assert WORDS["play_by_person"] in page
-    assert "I go on." in page
+    assert page.index("I go on.") < page.index("<fieldset"), "beside the picture, above the actions"
     assert player.post(session, do="go").status_code == 303
     assert player.wait_for(session, WORDS["play_failure"])
 

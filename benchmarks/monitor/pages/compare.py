@@ -11,6 +11,7 @@ from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.episode_view import EpisodeView, view_of
 from benchmarks.monitor.failures import FAILURES
 from benchmarks.monitor.listing import page_number, page_of
+from benchmarks.monitor.settings_view import settings_of
 from benchmarks.monitor.site import NotFound, Routes, Site, or_nothing
 from er_gym.rollout.run_directory import RunDirectory
 
@@ -68,6 +69,7 @@ class ComparePages:
             if (pair.change == change if change else pair.change in ("gained", "lost"))
         ]
         flipped.sort(key=lambda pair: (CHANGES.index(pair.change), pair.key))
+        settings = settings_of([summary for summary, _ in runs])
         counts = [self._site.failures(directory) for directory in directories]
         variables = {
             "runs": [summary for summary, _ in runs],
@@ -76,6 +78,8 @@ class ComparePages:
                 for kind in FAILURES
                 if any(counted.number(kind) for counted in counts)
             ],
+            "settings": settings,
+            "unlike": [one.name for one in settings if one.differs and one.matters],
             "counted": [(counted.done, counted.failed) for counted in counts],
             "every": [
                 self._site.summary(directory) for directory in self._site.directories.of_kind("run")
@@ -110,7 +114,7 @@ class ComparePages:
                 for directory, run, view in zip(directories, runs, views, strict=True)
             ],
             "parts_at": parts_at,
-            "scripts": ("episode.js",),
+            "scripts": ("episode.js", "enlarge.js"),
         }
         return self._site.show(request, "compare_episode.html", variables)
 

@@ -112,7 +112,7 @@ class DataPages(ReplayPages):
             "filter": filter,
             "before": before,
             "after": after,
-            "scripts": ("episode.js",),
+            "scripts": ("episode.js", "enlarge.js"),
             "at": "data",
         }
         return self._site.show(request, "trajectory.html", variables)

@@ -51,7 +51,7 @@ class EpisodePages(ReplayPages):
             "filter": chosen,
             "before": before,
             "after": after,
-            "scripts": ("episode.js",),
+            "scripts": ("episode.js", "enlarge.js"),
         }
         return self._site.show(request, "episode.html", variables)
 

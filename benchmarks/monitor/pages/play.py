@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
+from urllib.parse import urlencode
 
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import HTMLResponse, PlainTextResponse, RedirectResponse
@@ -13,7 +13,6 @@ from starlette.concurrency import run_in_threadpool
 
 from agents import AGENTS
 from agents.zoo.index import PREFIX, model_names
-from benchmarks.monitor.news import news
 from benchmarks.monitor.play.forms import BadForm, Forms
 from benchmarks.monitor.play.plan import plan, playable, run_path
 from benchmarks.monitor.play.session import Order, Refused, Session, SessionState
@@ -43,7 +42,6 @@ KEYS: Mapping[str, str] = {
 """The key that goes to the actions of a verb."""
 _PATIENCE_SECONDS = 25.0
 """How long an answer waits for what was asked for; the page then shows how far it is."""
-_LOOK_SECONDS = 0.15
 _ORDERS: frozenset[str] = frozenset(get_args(Order))
 _FIRST = "mini"
 
@@ -53,7 +51,6 @@ class PlayPages:
 
     Args:
         site: what all pages share.
-        closing: set when the server is to end.
         folder: holds the runs that a person plays; None if nobody may play.
         vlm_run: the run of a vision-language agent that a person watches; see :func:`plan`.
     """
@@ -61,12 +58,10 @@ class PlayPages:
     def __init__(
         self,
         site: Site,
-        closing: threading.Event,
         folder: Path | None,
         vlm_run: Callable[[str], VLMRun] | None = None,
     ) -> None:
         self._site, self._folder, self._vlm_run = site, folder, vlm_run
-        self._closing = closing
         self.sessions = Sessions()
         self._forms = Forms()
 
@@ -76,7 +71,7 @@ class PlayPages:
             "/play": self.choose,
             "/play/{id}": self.show,
             "/play/{id}/picture": self.picture,
-            "/play/{id}/news": self.news,
+            "/play/{id}/version": self.version,
         }
         for path, page in gets.items():
             app.add_api_route(path, page, methods=["GET"], response_class=HTMLResponse)
@@ -86,11 +81,13 @@ class PlayPages:
 
     # -- choosing --------------------------------------------------------------------------------
 
-    def choose(self, request: Request, suite: str = _FIRST, type: str = "") -> Response:
+    def choose(
+        self, request: Request, suite: str = _FIRST, type: str = "", agent: str = ""
+    ) -> Response:
         """The choice of what to play."""
         if self._folder is None:
             return self._site.show(request, "play.html", {"on": False, "problem": ""})
-        return self._choice(request, {"suite": suite, "type": type})
+        return self._choice(request, {"suite": suite, "type": type, "agent": agent})
 
     def _choice(
         self, request: Request, given: Mapping[str, str], problem: str = "", status: int = 200
@@ -127,7 +124,9 @@ class PlayPages:
             "sessions": self.sessions.open_now(),
             "folder": self._folder,
         }
-        return self._site.show(request, "play.html", variables, status)
+        return self._site.show(
+            request, "play.html", variables | {"scripts": ("choose.js",)}, status
+        )
 
     async def begin(self, request: Request) -> Response:
         """Begin a session."""
@@ -142,6 +141,9 @@ class PlayPages:
     def _begin(self, request: Request, form: Mapping[str, str]) -> Response:
         assert self._folder is not None
         words = self._site.translator(request)
+        if form.get("do") == "show":  # without JavaScript
+            chosen = {name: form.get(name, "") for name in ("suite", "type", "agent")}
+            return RedirectResponse(f"/play?{urlencode(chosen)}", 303)
         try:
             made = plan(
                 self._folder,
@@ -187,7 +189,7 @@ class PlayPages:
             "problem": problem,
             "secret": self._forms.secret,
             "directory": self._site.directories.at(run, "run"),
-            "scripts": ("play.js",),
+            "scripts": ("play.js", "enlarge.js"),
         }
         return self._site.show(request, "play_session.html", variables, status)
 
@@ -216,14 +218,9 @@ class PlayPages:
         picture = pictures[n]
         return Response(picture.data, media_type=picture.media_type)
 
-    async def news(self, request: Request, id: str) -> Response:
-        """Server-sent events: one for each change of a session, with its version."""
-        session = self._session(id)
-
-        async def version() -> int:
-            return session.now.version
-
-        return news(request, self._closing, version, _LOOK_SECONDS, data=lambda number: number)
+    async def version(self, id: str) -> Response:
+        """The version of a session."""
+        return PlainTextResponse(str(self._session(id).now.version))
 
     def _session(self, id: str) -> Session:
         session = self.sessions.get(id)

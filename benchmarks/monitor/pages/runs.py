@@ -9,6 +9,7 @@ from fastapi import Request, Response
 
 from benchmarks.monitor.listing import page_of
 from benchmarks.monitor.run_view import Filter, RunView
+from benchmarks.monitor.settings_view import settings_of
 from benchmarks.monitor.site import Routes, Site
 from benchmarks.study.paper_rungs import PAPER
 from er_gym.tasks.types import COMPOSITE, MANIPULATE, SEARCH, TRANSPORT
@@ -31,12 +32,15 @@ def run_variables(view: RunView, chosen: Filter) -> dict[str, Any]:
     """What the page of a run says."""
     groups, types = view.success_counts()
     choices = view.choices()
+    summary = view.summary()
     return {
-        "run": view.summary(),
+        "run": summary,
+        "settings": settings_of([summary]),
         "filter": chosen,
         "page": page_of(view.chosen(chosen), chosen.page),
         "groups": groups,
         "types": types,
+        "samples": view.sample_counts(),
         "choices": choices,
         "unknown": chosen.unknown_type(choices["type"]),
         "failures": view.failures,

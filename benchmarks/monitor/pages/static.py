@@ -42,7 +42,7 @@ class StaticPages:
             raise NotFound
         back = request.query_params.get("back", "/")
         answer = RedirectResponse(back if _is_here(back) else "/", 303)
-        answer.set_cookie(LANGUAGE, name, max_age=10**8, httponly=True, samesite="strict")
+        answer.set_cookie(LANGUAGE, name, max_age=10**8, httponly=True, samesite="lax")
         return answer
 
 

@@ -107,7 +107,8 @@ def plan(
         folder: holds the runs that are written.
         suite: one of er-gym's own.
         type: of tasks; "" for any.
-        task: the id of the task; "" for all of this type that have not been played.
+        task: the id of the task, which must be of the type; "" for all of this type that have not
+            been played.
         agent: see :class:`Plan`.
         vlm_run: the run of a vision-language agent by its name, with what the user says of the
             model; None if nothing is said of it.
@@ -117,9 +118,7 @@ def plan(
             is allowed.
     """
     found, fitted = playable(suite)
-    chosen = select(
-        fitted.tasks, task_ids=[task] if task else (), types=[type] if type and not task else ()
-    )
+    chosen = select(fitted.tasks, task_ids=[task] if task else (), types=[type] if type else ())
     acting = _acting(agent, vlm_run)
     seen = acting.env["obs_mode"].split("+")
     shown = {"obs_mode": "+".join(seen if _SEES in seen else (*seen, _SEES))}

@@ -14,21 +14,16 @@ const setUp = (player, moved) => {
   const map = player.querySelector("[data-map]");
   const frame = player.querySelector("[data-frame]");
   let drawn = false;
-  // Of a trajectory, the pictures before a turn's decision belong to the turn itself.
-  const ahead = player.dataset.shown === "before" ? 0 : 1;
   const show = (number, scroll) => {
     const now = Math.max(0, Math.min(last, number));
     slider.value = now;
     output.textContent = output.dataset.words.replace("#", now);
-    const done = new Set(), seen = [];
+    const done = new Set(), here = steps[now];
+    // The picture and the place at which the step was decided stand beside its thoughts.
+    const seen = numbers(here && here.dataset.pictures), stood = here ? Number(here.dataset.stand) : 0;
     steps.forEach((step, place) => {
       step.classList.toggle("now", place === now);
       if (place <= now) numbers(step.dataset.done).forEach((one) => done.add(one));
-      // The pictures that the agent has before it decides: those of the step after this one.
-      if (place <= Math.min(last, now + ahead)) {
-        const own = numbers(step.dataset.pictures);
-        if (own.length) { seen.length = 0; seen.push(...own); }
-      }
     });
     for (const picture of pictures) {
       const shown = seen.includes(Number(picture.dataset.picture));
@@ -37,8 +32,8 @@ const setUp = (player, moved) => {
     }
     keyActions.forEach((one, place) => one.classList.toggle("done", done.has(place)));
     for (const stand of map.querySelectorAll("[data-map-step]"))
-      stand.classList.toggle("now", Number(stand.dataset.mapStep) === now);
-    if (frame && drawn) { frame.src = frame.dataset.frame + "&n=" + now; frame.hidden = false; }
+      stand.classList.toggle("now", Number(stand.dataset.mapStep) === stood);
+    if (frame && drawn) { frame.src = frame.dataset.frame + "&n=" + stood; frame.hidden = false; }
     if (scroll && steps[now]) {  // the list alone scrolls, not the page
       const list = steps[now].parentElement;
       if (list.scrollHeight > list.clientHeight)

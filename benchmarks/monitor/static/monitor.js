@@ -1,51 +1,83 @@
-// News: a page names what it shows; when that changes, its parts are fetched again and replaced.
+// A page names what it shows; when that changes, its parts are fetched again and renewed.
 "use strict";
 
-// Calls renew for each change that an address tells of, and when the server is back; with atOnce,
-// also when it is reached first.
-const listen = (address, renew, atOnce) => {
-  let lost = atOnce;
-  const open = () => {
-    const source = new EventSource(address);
-    source.addEventListener("change", renew);
-    source.onopen = () => { if (lost) { lost = false; renew(null); } };
-    source.onerror = () => {
-      lost = true;
-      if (source.readyState === EventSource.CLOSED) { source.close(); setTimeout(open, 1000); }
-    };
+// Calls renew whenever an address answers otherwise than it did, at first than what is known. It
+// asks again and again, since a connection that stays open would be one of the six that a browser
+// has for all pages of a server. A page that nobody sees does not ask.
+const follow = (address, known, pause, renew) => {
+  let asking = false, timer = 0;
+  const look = async () => {
+    clearTimeout(timer);
+    if (document.hidden || asking) return;
+    asking = true;
+    try {
+      const answer = await fetch(address, { signal: AbortSignal.timeout(20000) });
+      const now = answer.ok ? await answer.text() : `${answer.status}`;
+      if (now !== known) { await renew(now); known = now; }
+    } catch (error) {
+      // The server is away; it is asked until it is back.
+    } finally {
+      asking = false;
+      timer = setTimeout(look, pause);
+    }
   };
-  open();
+  document.addEventListener("visibilitychange", look);
+  look();
+};
+
+// What an element is known by among its siblings.
+const nameOf = (node) =>
+  node.nodeType !== Node.ELEMENT_NODE ? "" : node.id || node.dataset.row || (node.classList.contains("scroll") ? "scroll" : "");
+
+// Makes a node like a fresh one, and leaves in place what is the same: it stays scrolled, opened and
+// focused as the reader left it.
+const turnInto = (old, fresh) => {
+  if (old.nodeType !== Node.ELEMENT_NODE) {
+    if (old.data !== fresh.data) old.data = fresh.data;
+    return;
+  }
+  for (const { name } of [...old.attributes]) if (name !== "open" && !fresh.hasAttribute(name)) old.removeAttribute(name);
+  for (const { name, value } of fresh.attributes) if (name !== "open" && old.getAttribute(name) !== value) old.setAttribute(name, value);
+  const wanted = new Set([...fresh.childNodes].map(nameOf)), named = new Map();
+  for (const child of old.childNodes) if (nameOf(child)) named.set(nameOf(child), child);
+  let at = old.firstChild;
+  const passOver = (node) => { at = node.nextSibling; node.remove(); };
+  for (const child of fresh.childNodes) {
+    const name = nameOf(child), same = name ? named.get(name) : null;
+    while (at && nameOf(at) && !wanted.has(nameOf(at))) passOver(at);
+    // What stands before it is removed, rather than it be moved: a node that moves loses all that.
+    while (same && at && at !== same && !nameOf(at)) passOver(at);
+    const kept = same || (at && !name && !nameOf(at) && at.nodeName === child.nodeName ? at : null);
+    if (!kept) { old.insertBefore(document.importNode(child, true), at); continue; }
+    named.delete(name);
+    if (kept !== at) old.insertBefore(kept, at);
+    turnInto(kept, child);
+    at = kept.nextSibling;
+  }
+  while (at) passOver(at);
 };
 
 const live = document.body.dataset.live;
 if (live) {
-  let busy = false, again = false;
+  let waits = false;
+  // A part in which text is selected waits, so that it can be copied.
+  const isSelected = (part) => {
+    const selection = getSelection();
+    return !selection.isCollapsed && selection.rangeCount > 0 && selection.getRangeAt(0).intersectsNode(part);
+  };
   const renew = async () => {
-    if (busy) { again = true; return; }
-    busy = true;
-    try {
-      const answer = await fetch(location.href, { headers: { Accept: "text/html" } });
-      if (answer.ok) {
-        const page = new DOMParser().parseFromString(await answer.text(), "text/html");
-        for (const fresh of page.querySelectorAll("[data-part]")) {
-          const old = document.getElementById(fresh.id);
-          if (old && old.innerHTML !== fresh.innerHTML) {
-            const focused = old.contains(document.activeElement) ? document.activeElement : null;
-            const address = focused && focused.getAttribute("href");
-            old.innerHTML = fresh.innerHTML;
-            if (address) {
-              for (const link of old.querySelectorAll("a"))
-                if (link.getAttribute("href") === address) { link.focus({ preventScroll: true }); break; }
-            }
-          }
-        }
-      }
-    } catch (error) {
-      // The server is away; the stream below says when it is back.
-    } finally {
-      busy = false;
-      if (again) { again = false; setTimeout(renew, 300); }
+    const answer = await fetch(location.href, { headers: { Accept: "text/html" } });
+    if (!answer.ok) return;
+    const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+    waits = false;
+    for (const fresh of page.querySelectorAll("[data-part]")) {
+      const old = document.getElementById(fresh.id);
+      if (!old || old.isEqualNode(fresh)) continue;
+      if (isSelected(old)) waits = true; else turnInto(old, fresh);
     }
   };
-  listen("/live?of=" + encodeURIComponent(live), renew, false);
+  document.addEventListener("selectionchange", () => {
+    if (waits && getSelection().isCollapsed) { waits = false; renew().catch(() => { waits = true; }); }
+  });
+  follow("/live?of=" + encodeURIComponent(live), document.body.dataset.state, 700, renew);
 }

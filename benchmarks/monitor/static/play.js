@@ -5,6 +5,7 @@ const board = () => document.getElementById("play");
 if (board()) {
   const address = "/play/" + board().dataset.session;
   let sending = false, again = false;
+  const typed = [];  // keys that were pressed while an action was on its way: they are for what comes of it
 
   // What the page asked for by itself (news) must be newer: else the focus is lost between two keys.
   const take = async (text, news) => {
@@ -19,22 +20,24 @@ if (board()) {
     if (stale()) return;
     // What was opened, and the focus, stay where they are.
     const open = new Set([...board().querySelectorAll(".played-steps details[open]")].map((one) => one.closest("li").value));
-    const pressed = document.activeElement && document.activeElement.dataset.press;
+    const was = document.activeElement, group = was && was.closest("fieldset[data-verb]");
+    const name = (attribute, value) => `[${attribute}="${CSS.escape(value || "")}"]`;
+    const inside = board().contains(was);
     board().replaceWith(fresh);
     document.title = page.title;
     for (const details of fresh.querySelectorAll(".played-steps details")) details.open = open.has(details.closest("li").value);
-    if (pressed) { const button = fresh.querySelector(`[data-press="${pressed}"]`); if (button) button.focus({ preventScroll: true }); }
+    if (!inside) return;
+    const same = was.dataset.press ? fresh.querySelector(name("data-press", was.dataset.press))
+      : fresh.querySelector("button" + name("name", "action") + name("value", was.value))
+        || (group && fresh.querySelector("fieldset" + name("data-verb", group.dataset.verb) + " button"));
+    (same || fresh).focus({ preventScroll: true });
   };
-  const renew = async (event) => {
-    if (event && event.data === board().dataset.version) return;
+  const renew = async (version) => {
+    if (version === board().dataset.version) return;
     if (sending) { again = true; return; }
-    try {
-      const answer = await fetch(address, { headers: { Accept: "text/html" } });
-      const text = await answer.text();
-      if (sending) again = true; else await take(text, true);
-    } catch (error) {
-      // The server is away; the stream below says when it is back.
-    }
+    const answer = await fetch(address, { headers: { Accept: "text/html" } });
+    const text = await answer.text();
+    if (sending) again = true; else await take(text, true);
   };
   const send = async (form, submitter) => {
     if (sending) return;
@@ -50,7 +53,12 @@ if (board()) {
       delete board().dataset.busy;
     } finally {
       sending = false;
-      if (again) { again = false; renew(null); }
+      if (board().querySelector(".news .problem, .result")) typed.length = 0;
+      while (typed.length && !sending) {
+        const key = typed.shift();
+        if (!act(key, document.activeElement) && key === "enter" && board().contains(document.activeElement)) document.activeElement.click();
+      }
+      if (again) { again = false; renew("").catch(() => {}); }
     }
   };
   document.addEventListener("submit", (event) => {
@@ -64,29 +72,37 @@ if (board()) {
     const next = all[(all.indexOf(button) + by + all.length) % all.length];
     if (next) next.focus();
   };
-  document.addEventListener("keydown", (event) => {
-    if (event.altKey || event.ctrlKey || event.metaKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) return;
-    const key = event.key.toLowerCase();
-    const inside = event.target.closest && event.target.closest("fieldset");
-    if (key === "escape") { if (document.activeElement) document.activeElement.blur(); return; }
+  // Does what a key asks for while an element has the focus; false if it asks for nothing here.
+  const act = (key, target) => {
+    const inside = target.closest && target.closest("fieldset");
+    if (key === "escape") { target.blur(); return true; }
     if (inside) {
       const by = { arrowright: 1, arrowdown: 1, arrowleft: -1, arrowup: -1 }[key];
-      if (by) { event.preventDefault(); move(event.target, by); return; }
+      if (by) { move(target, by); return true; }
       if (/^[a-z]$/.test(key)) {
         const named = [...inside.querySelectorAll("button")].filter((one) => one.textContent.trim().toLowerCase().startsWith(key));
         if (named.length) {
-          event.preventDefault();
-          named[(named.indexOf(event.target) + 1) % named.length].focus();
-          return;
+          named[(named.indexOf(target) + 1) % named.length].focus();
+          return true;
         }
       }
     }
-    if (key === " " && event.target.tagName === "BUTTON" && !event.target.dataset.press) return;
+    if (key === " " && target.tagName === "BUTTON" && !target.dataset.press) return false;
     const pressed = board().querySelector(`[data-press="${CSS.escape(key)}"]`) || (key === " " && board().querySelector('[data-press=" "]'));
-    if (pressed) { event.preventDefault(); pressed.click(); return; }
+    if (pressed) { pressed.click(); return true; }
     const group = /^[a-z]$/.test(key) && board().querySelector(`fieldset[data-verb="${key}"] button, button[data-verb="${key}"]`);
-    if (group) { event.preventDefault(); group.focus(); }
+    if (group) group.focus();
+    return Boolean(group);
+  };
+  document.addEventListener("keydown", (event) => {
+    if (event.altKey || event.ctrlKey || event.metaKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) return;
+    if (document.querySelector("dialog[open]")) return;
+    const key = event.key.toLowerCase();
+    if (sending && /^([a-z ]|enter|escape|arrow\w+)$/.test(key)) {
+      event.preventDefault();
+      if (!event.repeat) typed.push(key);
+    } else if (act(key, event.target)) event.preventDefault();
   });
 
-  listen(address + "/news", renew, true);  // of monitor.js
+  follow(address + "/version", board().dataset.version, 250, renew);  // of monitor.js
 }

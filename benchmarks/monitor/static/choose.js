@@ -1,0 +1,26 @@
+// What to play: the types and the tasks that can be chosen are those of the suite and the type that are chosen.
+"use strict";
+
+const form = document.getElementById("choose");
+if (form) {
+  const { suite, type, task } = form.elements;
+  let asked = 0;
+  form.addEventListener("change", async (event) => {
+    if (event.target !== suite && event.target !== type) return;
+    const number = ++asked;
+    task.replaceChildren(task.options[0]);  // what is chosen now holds at once
+    task.value = "";
+    if (event.target === suite) type.value = "";
+    try {
+      const answer = await fetch("/play?" + new URLSearchParams({ suite: suite.value, type: type.value }));
+      const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+      const fresh = page.getElementById("choose");
+      if (number !== asked || !fresh) return;
+      task.replaceChildren(...fresh.elements.task.children);
+      if (event.target === suite) type.replaceChildren(...fresh.elements.type.children);
+      document.getElementById("about").textContent = page.getElementById("about").textContent;
+    } catch (error) {
+      // The server is away: the next task of the choice can still be begun once it is back.
+    }
+  });
+}
