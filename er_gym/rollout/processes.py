@@ -24,6 +24,9 @@ CONTEXT = multiprocessing.get_context("spawn")
 GRACE_SECONDS = 5.0
 """Seconds within which a process must end by itself; then it is killed."""
 
+_AGAIN_SECONDS = 0.05
+"""After which a signal whose exception was lost comes again."""
+
 
 class Terminated(SystemExit):
     """Raised on SIGTERM: the process must end, whatever code is running in it."""
@@ -97,6 +100,7 @@ def _run(target: Callable[..., None], args: tuple[Any, ...]) -> None:
     """The first thing that a worker process calls."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _exit_cleanly)
+    sys.unraisablehook = _end_later
     end_with_parent()
     target(*args)
 
@@ -115,6 +119,17 @@ def _exit_cleanly(signum: int, frame: object) -> NoReturn:
     """
     signal.signal(signum, lambda *_: None)  # programs started meanwhile would inherit SIG_IGN
     raise Terminated(128 + signum)
+
+
+def _end_later(lost: sys.UnraisableHookArgs) -> None:
+    """Where Python can raise nothing, as while it lets go of an object, the signal comes again."""
+    if not isinstance(lost.exc_value, Terminated):
+        sys.__unraisablehook__(lost)
+        return
+    signal.signal(signal.SIGTERM, _exit_cleanly)
+    again = threading.Timer(_AGAIN_SECONDS, os.kill, (os.getpid(), signal.SIGTERM))
+    again.daemon = True
+    again.start()
 
 
 def _follow_parent() -> None:

@@ -58,5 +58,23 @@ class Mixed(Slow):
         return job
 
 
+class LettingGo(Slow):
+    """Is let go of for a minute: what is raised meanwhile is lost."""
+
+    def __call__(self, job: int) -> int:
+        Letting(self.folder)
+        time.sleep(60)
+        return job
+
+
+class Letting:
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __del__(self) -> None:
+        (self.folder / f"began-{os.getpid()}").touch()
+        time.sleep(60)
+
+
 def no_such_engine() -> Squarer:
     raise OSError("no such engine")

@@ -11,7 +11,7 @@ import sys
 import time
 from functools import partial
 from pathlib import Path
-from threading import Timer
+from threading import Thread, Timer
 
 import pytest
 from support import in_one_test, run_python
@@ -129,6 +129,20 @@ def test_a_worker_goes_on_while_its_result_is_looked_at(jobs, tmp_path):
     assert next(results) == ("quick", "quick")
     wait_for(lambda: list(tmp_path.glob("began-*")))
     results.close()
+
+
+def test_a_worker_ends_where_python_can_raise_nothing(jobs, tmp_path, capfd):
+    def end():
+        wait_for(lambda: list(tmp_path.glob("began-*")))
+        (began,) = tmp_path.glob("began-*")
+        os.kill(int(began.name.removeprefix("began-")), signal.SIGTERM)
+
+    Thread(target=end).start()
+    ((_, lost),) = run_jobs(partial(jobs.LettingGo, tmp_path), [1], workers=1, tries=1)
+    assert isinstance(lost, LostJob)
+    assert lost.exitcode == 128 + signal.SIGTERM
+    assert list(tmp_path.glob("closed-*"))
+    assert "Traceback" not in capfd.readouterr().err
 
 
 PARENT = """
