@@ -93,7 +93,7 @@ NAMES_EN: Mapping[str, tuple[str, ...]] = {
     "ShowerGlass": ("glass shower wall", "shower screen", "shower wall"),
     "ShowerHead": ("shower nozzle",),
     "SideTable": ("end table", "bedside table", "night table"),
-    "Sink": ("washbasin", "wash basin", "kitchen sink", "bathroom sink"),
+    "Sink": ("wash basin", "kitchen sink", "bathroom sink"),
     "SinkBasin": ("sink bowl",),
     "SoapBar": ("bar of soap", "bath soap"),
     "SoapBottle": ("soap dispenser", "liquid soap", "hand soap", "dish soap", "bottle of soap"),
@@ -103,7 +103,7 @@ NAMES_EN: Mapping[str, tuple[str, ...]] = {
     "Statue": ("sculpture", "bust"),
     "Stool": ("bar stool",),
     "StoveBurner": (
-        "hotplate", "hot plate", "burner", "cooktop", "stove top", "hob", "gas stove", "cooker",
+        "hot plate", "burner", "cooktop", "stove top", "hob", "gas stove", "cooker",
         "range",
     ),
     "StoveKnob": ("knob", "burner knob", "stove control", "stove dial"),

@@ -150,3 +150,16 @@ def test_true_claims_stand(text: str) -> None:
 def test_sentences_without_a_claim_are_counted_as_unknown() -> None:
     thought = Thought("How dull. The faucet is off.", "reasoning", LIMIT, KITCHEN)
     assert unknown_sentences(thought) == (1, 2)
+
+
+@in_one_test(
+    "text",
+    [
+        "料理台和冰箱都没有结果，再找找吧。",
+        "还没有收获。要看到里面才行，我拉开冰箱看看里面。",
+        "右手边的冰箱走过去很方便。",
+    ],
+)
+def test_what_came_of_nothing_and_what_is_meant_now_is_no_claim(text: str) -> None:
+    """没有结果 denies no thing, and without 了 nothing has been opened or visited."""
+    assert codes(text) <= {"decision"}
