@@ -22,7 +22,7 @@ import er_gym
 from benchmarks.cli.activity import doing
 from benchmarks.cli.extras import claimants, extras, installed_version, state_of
 from er_gym.plugins import NOT_FROM_HERE
-from er_gym.thor import SCENE_NAMES, kernel, make_controller
+from er_gym.thor import SCENE_NAMES, compiled_kernel, make_controller
 from er_gym.thor.client_folder import GpuMapping, Release
 from er_gym.thor.launcher import executable_in
 
@@ -75,7 +75,7 @@ def _engine() -> Iterator[Check]:
 
 def _compiled_kernel() -> Check:
     name = "compiled kernel"
-    if kernel() is not None:
+    if compiled_kernel() is not None:
         return Check(name, True, "made by the C compiler; steps are half as long again without it")
     detail = "no C compiler works here; NumPy gives the same results, more slowly"
     return Check(name, False, detail, "apt-get install gcc libc6-dev")

@@ -16,7 +16,7 @@ from typing import Literal
 from er_gym.data.names_en import MODIFIERS, NAMES_EN
 from er_gym.data.names_zh import NAMES_ZH
 from er_gym.data.shared_names import SHARED_EN, SHARED_ZH
-from er_gym.envs.observations import goal
+from er_gym.envs.asked_goal import goal
 from er_gym.tasks.equivalence import same_type
 from er_gym.thor import OBJECT_TYPES
 

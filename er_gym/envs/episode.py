@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from er_gym.envs import skills
 from er_gym.envs.action_handler import ActionHandler, EpisodeSetup, StepContext
 from er_gym.envs.actions import Action, AnyAction
+from er_gym.envs.asked_goal import goal_row
 from er_gym.envs.faults import FaultPlan, FaultyActionHandler
 from er_gym.envs.info import REPEATED, Details, Info, LegalActions
 from er_gym.envs.legality import KnownTypes
-from er_gym.envs.observations import MAX_REPEATS, Memory, Observation, Situation, goal_row, text_of
+from er_gym.envs.observations import MAX_REPEATS, Memory, Observation, Situation, text_of
 from er_gym.envs.perception import Perception
 from er_gym.envs.protocol import EpisodeProtocol
 from er_gym.tasks import verbs

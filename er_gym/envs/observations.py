@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 import string
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import astuple, dataclass, field
-from functools import cache, cached_property, lru_cache
+from functools import cached_property
 from math import cos, radians, sin
 from typing import Any
 
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from er_gym.envs.actions import Action
 from er_gym.envs.arguments import short_repr
+from er_gym.envs.asked_goal import GOAL_VERBS, goal, goal_row
 from er_gym.envs.legality import AvailableObjects, KnownTypes
 from er_gym.envs.object_view import FEATURES as OBJECT_FEATURES
 from er_gym.envs.object_view import object_features
@@ -51,18 +52,6 @@ FEATURES = (
 """
 _POSE = ("right", "ahead", "sin", "cos", "horizon", "standing")
 _EPISODE = ("steps", "success", "holding", "repeats")
-GOAL_VERBS: Mapping[str, str] = {
-    "search": r"find|search|look|locate|where",
-    "pickup": r"pick|take|grab|get|fetch|bring",
-    "put": r"put|place|set|move|store|leave",
-    "toggle": r"toggle|turn|switch|flip",
-    "open": r"open",
-    "close": r"close|shut",
-    "then": r"then|after|before|first",
-    **{verb.name: "|".join(map(re.escape, verb.said)) for verb in verbs.ADDED},
-}
-"""The words of an instruction that say what to do, by their meaning. The words of the verbs that
-other packages add are included."""
 SCALARS = (
     *_POSE,
     *_EPISODE,
@@ -102,7 +91,7 @@ MAX_REPEATS = 3
 """The number of times in a row that the same action is executed; one more ends the episode."""
 
 
-_REMEMBERED = ("seen", "is_open", "is_on", "found", "did")
+REMEMBERED = ("seen", "is_open", "is_on", "found", "did")
 """The arrays of a memory that change as the episode goes on."""
 
 
@@ -120,7 +109,7 @@ class Memory:
 
     Attributes:
         start: the agent's start pose.
-        wanted: (T,) float32, the weight of each type in the instruction, see :func:`goal`.
+        wanted: (T,) float32, the weight of each type in the instruction, :func:`.asked_goal.goal`.
         seen: (T,) bool, the types that the agent has seen.
         is_open, is_on: (T,) bool, whether one was open, or switched on, when last seen.
         found: (T,) float32, the greatest weight of the types in view at each type navigated to.
@@ -170,7 +159,7 @@ class Memory:
         """All but the instruction's part, as plain data."""
         return {
             "start": list(astuple(self.start)),
-            "arrays": [getattr(self, name).tobytes() for name in _REMEMBERED],
+            "arrays": [getattr(self, name).tobytes() for name in REMEMBERED],
             "last": self.last and [self.last.verb, self.last.object_type],
             "repeats": self.repeats,
         }
@@ -179,7 +168,7 @@ class Memory:
     def of_state(state: Mapping[str, Any], instruction: str) -> Memory:
         """The memory whose :meth:`state` this is."""
         memory = Memory(AgentPose(*state["start"]), goal_row(instruction))
-        for name, content in zip(_REMEMBERED, state["arrays"], strict=True):
+        for name, content in zip(REMEMBERED, state["arrays"], strict=True):
             array = getattr(memory, name)
             array[:] = np.frombuffer(content, array.dtype).reshape(array.shape)
         memory.last = None if state["last"] is None else Action(*state["last"])
@@ -235,58 +224,6 @@ class Situation:
         """The agent's view as an observation shows it, (height, width, 3) uint8; None where nothing
         is drawn. Read-only."""
         return self.perception.annotated if self.annotate else self.perception.frame
-
-
-@cache
-def _named() -> Sequence[tuple[str, str, re.Pattern[str]]]:
-    """The object types, the longest names first, each with its first word in small letters, and
-    with how an instruction names it."""
-    found = []
-    for name in sorted(TYPES, key=len, reverse=True):
-        words = re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z]+|\d+", name)
-        apart = r"[\s-]?".join(words)
-        pattern = re.compile(rf"\b{apart}(?:s|es)?\b", re.IGNORECASE)
-        found.append((name, words[0].lower(), pattern))
-    return found
-
-
-@cache
-def _asked() -> Sequence[re.Pattern[str]]:
-    return [re.compile(rf"\b(?:{words})", re.IGNORECASE) for words in GOAL_VERBS.values()]
-
-
-@lru_cache(maxsize=4096)
-def goal(instruction: str) -> tuple[tuple[float, ...], tuple[tuple[str, float], ...]]:
-    """What an instruction asks for, read from its words alone.
-
-    Returns:
-        A 0 or 1 for each of :data:`GOAL_VERBS`; and a weight for each object type that the
-        instruction names: 1 for the first, then 1/2, 1/3 and so on. ``credit card`` names a
-        CreditCard. A name inside a longer name in the same place does not count.
-    """
-    mentions = []
-    taken = np.zeros(len(instruction) + 1, dtype=bool)
-    small = instruction.casefold()
-    for name, first_word, pattern in _named():
-        if first_word not in small:  # quicker than the pattern, which most names do not match
-            continue
-        for match in pattern.finditer(instruction):
-            span = slice(*match.span())
-            if not taken[span].any():
-                taken[span] = True
-                mentions.append((match.start(), name))
-    order = list(dict.fromkeys(name for _, name in sorted(mentions)))
-    asked = tuple(float(bool(pattern.search(instruction))) for pattern in _asked())
-    return asked, tuple((name, 1.0 / (rank + 1)) for rank, name in enumerate(order))
-
-
-@lru_cache(maxsize=4096)
-def goal_row(instruction: str) -> NDArray[np.float32]:
-    """(T,) float32, the weight of each type in an instruction, see :func:`goal`; read-only."""
-    row = np.zeros(len(TYPES), dtype=np.float32)
-    for name, weight in goal(instruction)[1]:
-        row[KIND_OF[name]] = weight
-    return row
 
 
 def _relative_pose(situation: Situation) -> tuple[float, ...]:

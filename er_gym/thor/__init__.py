@@ -3,7 +3,7 @@
 from er_gym.sim.placement_restrictions import accepts, placement_table
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError
 from er_gym.sim.size import check_size
-from er_gym.sim.space.compiled_sight import kernel
+from er_gym.sim.space.compiled_sight import kernel as compiled_kernel
 from er_gym.thor.backends import BACKENDS, LIGHTS, RENDER_DEVICES, BackendError, make_controller
 from er_gym.thor.launcher import thor_executable
 from er_gym.thor.object_types import OBJECT_TYPES, ObjectType
@@ -21,7 +21,7 @@ __all__ = [
     "UnknownSceneError",
     "accepts",
     "check_size",
-    "kernel",
+    "compiled_kernel",
     "make_controller",
     "objects_of",
     "placement_table",

@@ -7,14 +7,13 @@ import pytest
 from floor_plan_1 import FRIDGE
 from support import make_task
 
+from er_gym.envs.asked_goal import GOAL_VERBS, goal
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.observations import (
     FEATURES,
-    GOAL_VERBS,
     OBSERVATIONS,
     SCALARS,
     STATE_LAYOUT,
-    goal,
     parse_obs_mode,
 )
 from er_gym.tasks.task import AgentPose

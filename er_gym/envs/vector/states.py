@@ -11,24 +11,24 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.envs.asked_goal import GOAL_VERBS, goal
 from er_gym.envs.observations import (
     ASKED_ENTRIES,
     FEATURE_ROW,
     FEATURES,
     FIRST_DID,
-    GOAL_VERBS,
     LAST_ENTRY,
+    REMEMBERED,
     SCALARS,
     Memory,
     Situation,
-    goal,
     pose_and_episode,
 )
 from er_gym.envs.vector.legality import InRooms
 from er_gym.tasks import verbs
 from er_gym.thor.objects import KIND_OF, TYPES, ObjectTable
 
-_KEPT = ("seen", "is_open", "is_on", "found", "wanted", "did")
+_KEPT = (*REMEMBERED, "wanted")
 """The arrays of a memory."""
 
 
