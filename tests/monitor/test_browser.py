@@ -240,12 +240,17 @@ def test_a_person_plays_a_whole_task_to_success(page, serve, runs, tmp_path):
     )
 
 
+def begin_to_play(page: Any, shown: str) -> None:
+    page.click("button.main")
+    page.wait_for_selector(shown)
+    page.wait_for_load_state("domcontentloaded")  # keys are heard once the scripts have run
+
+
 def test_news_that_are_none_do_not_take_the_focus_between_two_keys(page, serve, tmp_path):
     """The page hears of another version after the first of two keys, and finds the same."""
     held: list[Any] = []
     page.goto(f"{serve(tmp_path, play=tmp_path / 'played').address}/play?suite=mini")
-    page.click("button.main")
-    page.wait_for_selector("button[data-verb=e]")
+    begin_to_play(page, "button[data-verb=e]")
     page.route(re.compile(r"/version$"), lambda route: held.append(route))
     while not held:
         page.wait_for_timeout(20)
@@ -261,8 +266,7 @@ def test_keys_are_kept_while_an_action_is_on_its_way_and_pictures_lie_as_seen(
     page, serve, tmp_path
 ):
     page.goto(f"{serve(tmp_path, play=tmp_path / 'played').address}/play?suite=mini")
-    page.click("button.main")
-    page.wait_for_selector("button[data-verb=l]")
+    begin_to_play(page, "button[data-verb=l]")
     page.keyboard.press("l")
     page.keyboard.press("Enter")
     page.wait_for_selector("input[name=step][value='2']", state="attached")
