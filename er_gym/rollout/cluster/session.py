@@ -252,9 +252,10 @@ def _join(address: str, modules: Sequence[Path]) -> None:
         logging_level=logging.ERROR,
         runtime_env=environment,
     )
+    failures = (ConnectionError, RuntimeError, ValueError, OSError, ImportError)
     try:
         _within(_JOIN_SECONDS, join)
-    except (ConnectionError, RuntimeError, ValueError, OSError, ImportError) as error:
+    except (*failures, ray.exceptions.RayError) as error:
         reason = " ".join(str(error).split())
         raise RayUnavailable(
             f"cannot join the Ray cluster at {address}: {reason[:300]}; {_WHICH_ADDRESS}"

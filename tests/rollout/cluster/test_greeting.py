@@ -113,7 +113,9 @@ def test_a_process_ends_where_what_greets_does_not_answer() -> None:
     with server(sends(SETTINGS)) as port:
         command = [sys.executable, "-c", JOIN, f"127.0.0.1:{port}"]
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=200)
-    (told,) = (line for line in done.stderr.splitlines() if "RayUnavailable: " in line)
+    lines = [line for line in done.stderr.splitlines() if "RayUnavailable: " in line]
+    assert len(lines) == 1, f"{done.returncode}: {done.stderr}"
+    (told,) = lines
     assert "cannot join the Ray cluster at 127.0.0.1:" in told
     assert "it has not let this machine join within 3 s" in told
     assert done.returncode == 1
