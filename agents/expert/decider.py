@@ -70,7 +70,7 @@ class DecidingAgent:
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """Begin an episode."""
         self._recorder = TrajectoryRecorder(
-            task, self._header, self._settings.pictures, self._rejects, learn_failures=False
+            task, self._header, self._settings.pictures, self._rejects
         )
         self._legs = legs_of(task)
         self._agent.reset(replace(task, instruction=self._instruct(task)), obs, info)

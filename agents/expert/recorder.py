@@ -18,6 +18,7 @@ from er_gym.data.collection import PLAYED
 from er_gym.data.critic import check
 from er_gym.data.dialects import shows_anew
 from er_gym.data.knowledge import Knowledge, knowledge_at
+from er_gym.data.train_rule import learnt
 from er_gym.data.trajectory import (
     Correction,
     Cost,
@@ -79,7 +80,6 @@ class TrajectoryRecorder:
         pictures: how pictures are encoded; None to record none.
         rejects: why a trajectory will not be taken, ``""`` if it will. Only a trajectory that will
             be taken leaves its pictures.
-        learn_failures: whether turns whose action was not done are to be learnt from.
 
     Attributes:
         turns: those so far.
@@ -92,10 +92,7 @@ class TrajectoryRecorder:
         header: TrajectoryHeader,
         pictures: Pictures | None,
         rejects: Callable[[Trajectory], str],
-        *,
-        learn_failures: bool = True,
     ) -> None:
-        self._learn_failures = learn_failures
         self._task, self._header, self._pictures, self._rejects = task, header, pictures, rejects
         self.turns: list[Turn] = []
         self.pictures_now: tuple[Picture, ...] = ()
@@ -210,12 +207,7 @@ class TrajectoryRecorder:
 
     def _trajectory(self, episode: EpisodeRecord) -> Trajectory:
         task, header = self._task, self._header
-        turns = train_after_fault(with_results(self.turns, self._faults, episode))
-        if not self._learn_failures:
-            turns = [
-                turn.model_copy(update={"train": turn.train and turn.success}) for turn in turns
-            ]
-        return Trajectory(
+        trajectory = Trajectory(
             id=task.id,
             task_id=header.task_id,
             task_type=episode.task_type,
@@ -231,12 +223,17 @@ class TrajectoryRecorder:
             language=header.language,
             actor=header.actor,
             max_steps=episode.max_steps,
-            turns=turns,
+            turns=with_results(self.turns, self._faults, episode),
             success=episode.success,
             end_reason=episode.end_reason,
             correction=header.correction,
             cost=self._cost,
         )
+        turns = [
+            turn.model_copy(update={"train": flag})
+            for turn, flag in zip(trajectory.turns, learnt(trajectory), strict=True)
+        ]
+        return trajectory.model_copy(update={"turns": turns})
 
     def _encoded(
         self, obs: Mapping[str, Any], info: Mapping[str, Any]
@@ -263,21 +260,6 @@ class TrajectoryRecorder:
         return PictureRecord(
             path=path, direction=direction, width=picture.width, height=picture.height
         )
-
-
-def train_after_fault(turns: list[Turn]) -> list[Turn]:
-    """Turns of which nothing is learnt up to the first fault or mistake, that turn included.
-
-    As in the paper's third stage (arXiv 2503.21696), the reflection on a fault and what follows it
-    are learnt. Turns without a fault stay as they are.
-    """
-    odd = [k for k, turn in enumerate(turns) if turn.fault or turn.purpose == "repeat"]
-    if not odd:
-        return turns
-    return [
-        turn.model_copy(update={"train": False}) if k <= odd[0] else turn
-        for k, turn in enumerate(turns)
-    ]
 
 
 def total_reply(replies: Sequence[ModelReply]) -> ModelReply | None:

@@ -93,23 +93,36 @@ class SavedEpisode(EzPickle):
 
         Raises:
             SnapshotError: it is damaged, of another version, or of an environment with other
-                arguments; the episode under way goes on.
+                arguments; the episode under way goes on. Or its content is none that
+                :meth:`snapshot` writes, which is seen while it is taken up: then none is under way.
         """
         saved = unpack(snapshot)
         with self._lock:
-            for name, own in self._deciding_arguments().items():
-                other = saved["arguments"].get(name)
-                if other != own:
-                    raise SnapshotError(
-                        f"the snapshot is of an environment with another {name}: {other!r}, and "
-                        f"this one has {own!r}"
-                    )
-            task = _saved_task(tuple(saved["task"]))
-            answer = self._resume(task, saved["episode"], saved["outer_limit"])
-            random, seed = saved["random"]
-            self._np_random, self._np_random_seed = generator_of(random), int(seed)
+            try:
+                self._check_arguments(saved["arguments"])
+                task = _saved_task(tuple(saved["task"]))
+                random, seed = saved["random"]
+                generator, seed = generator_of(random), int(seed)
+                answer = self._resume(task, saved["episode"], saved["outer_limit"])
+            except SnapshotError:
+                raise
+            except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
+                reason = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+                raise SnapshotError(
+                    f"the content of the snapshot is none that snapshot() writes ({reason})"
+                ) from error
+            self._np_random, self._np_random_seed = generator, seed
             self._show()
             return answer
+
+    def _check_arguments(self, saved: Mapping[str, Any]) -> None:
+        for name, own in self._deciding_arguments().items():
+            other = saved.get(name)
+            if other != own:
+                raise SnapshotError(
+                    f"the snapshot is of an environment with another {name}: {other!r}, and "
+                    f"this one has {own!r}"
+                )
 
     def fork(self: Env, n: int) -> list[Env]:
         """n environments like this one, in each of which the episode goes on by itself.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +137,7 @@ def test_another_process_goes_on(tmp_path: Path) -> None:
     env.step("observe")
     (tmp_path / "saved").write_bytes(env.snapshot())
     program = f"""
+from collections.abc import Iterator
 from pathlib import Path
 from er_gym import EmbodiedEnv
 env = EmbodiedEnv((), obs_mode="text")
@@ -262,3 +264,33 @@ def test_a_generator_goes_on() -> None:
     assert again.integers(2**62, size=5).tolist() == random.integers(2**62, size=5).tolist()
     with pytest.raises(ValueError, match="MT19937 cannot be saved"):
         generator_state(np.random.Generator(np.random.MT19937(0)))
+
+
+def mutations(value: Any, depth: int) -> Iterator[Any]:
+    """Plain data with one part of it left out or of another type, for the parts of some levels."""
+    if isinstance(value, dict) and depth:
+        for key, inner in value.items():
+            yield {name: one for name, one in value.items() if name != key}
+            yield from ({**value, key: other} for other in mutations(inner, depth - 1))
+    elif isinstance(value, list) and depth:
+        yield value[1:]
+        for index, inner in enumerate(value[:3]):
+            for other in mutations(inner, depth - 1):
+                yield [*value[:index], other, *value[index + 1 :]]
+    odd: tuple[Any, ...] = (None, "odd", -(2**40), [[]])
+    yield from (other for other in odd if other != value)
+
+
+def test_content_that_no_episode_writes_is_refused_in_words() -> None:
+    env = EmbodiedEnv(obs_mode="state", faults=0.4)
+    env.reset(seed=1)
+    saved = unpack(env.snapshot())
+    refused = 0
+    for crafted in mutations(saved, 4):
+        try:
+            env.restore(pack(crafted))
+        except SnapshotError:
+            refused += 1
+    assert refused > 100
+    env.restore(pack(saved))
+    env.close()
