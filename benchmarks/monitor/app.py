@@ -86,7 +86,9 @@ def make_app(
     @app.exception_handler(NotFound)
     @app.exception_handler(404)
     async def gone(request: Request, error: Exception) -> Response:
-        return await run_in_threadpool(site.show, request, "gone.html", {}, 404)
+        said = error if isinstance(error, NotFound) else NotFound()
+        told = {"key": said.key, "back": said.back}
+        return await run_in_threadpool(site.show, request, "gone.html", told, 404)
 
     every = (
         RunPages(site), EpisodePages(site), ComparePages(site), TrainingPages(site),

@@ -11,19 +11,21 @@ from typing import Any, ClassVar
 from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.event_tail import EpisodeRow, EventTail
 from benchmarks.monitor.failure_counts import FailureCounts
+from benchmarks.monitor.fingerprint import in_use
 from benchmarks.monitor.followed import Followed
 from benchmarks.monitor.listing import AddressFilter
 from benchmarks.monitor.record_rows import RecordRows
 from benchmarks.monitor.spending_tail import SpendingTail
 from benchmarks.scoring.metrics import success_rate
 from benchmarks.scoring.samples import TaskSamples, group_by, most_samples, task_samples
+from er_gym.locking import LOCK
 from er_gym.rollout.causes import count_causes
 from er_gym.rollout.events import EVENTS, Cost
 from er_gym.rollout.run_directory import SPENDING, Manifest, RunDirectory, RunDirectoryError
 from er_gym.tasks.types import task_type
 
 _SILENT_SECONDS = 120.0
-"""A run without an event for so long is not counted as playing."""
+"""A run without a lock and without an event for so long is not counted as playing."""
 _RECENT_SECONDS = 60.0
 
 
@@ -224,7 +226,7 @@ class RunView:
         elif not tail.version:
             state = "waiting"
         else:
-            state = "playing" if now - tail.time < _SILENT_SECONDS else "stopped"
+            state = "playing" if self._is_played(now - tail.time) else "stopped"
         since = [row for row in rows if row.ended is not None and row.ended >= tail.begun]
         spent = tail.time - tail.begun
         left = None
@@ -247,6 +249,11 @@ class RunView:
             causes=self._causes(rows),
             version=tail.version + (self._spending.spent.requests if self._spending.spent else 0),
         )
+
+    def _is_played(self, silent: float) -> bool:
+        """Whether a process plays it: by its lock, or where there is none by its last event."""
+        path = self.directory.path
+        return in_use(path) if (path / LOCK).exists() else silent < _SILENT_SECONDS
 
     def _causes(self, rows: Iterable[EpisodeRow]) -> list[str]:
         settings = self._manifest.agent_settings if self._manifest else {}

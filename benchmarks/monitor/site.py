@@ -40,7 +40,16 @@ _MOST_ASKED = 2000
 
 
 class NotFound(Exception):
-    """There is nothing at this address."""
+    """There is nothing at this address.
+
+    Args:
+        key: of the words that say so.
+        back: the address that the page leads to.
+    """
+
+    def __init__(self, key: str = "gone", back: str = "/") -> None:
+        super().__init__(key)
+        self.key, self.back = key, back
 
 
 @contextmanager

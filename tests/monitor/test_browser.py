@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -89,11 +88,13 @@ def test_a_run_fills_by_itself_though_run_and_server_are_killed(page, serve, tmp
         wait_until(page, 5)
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
+        page.wait_for_selector(".state.stopped")
         killed_at = finished(page)
         server.stop()
         process = bench(tmp_path / "runs" / "live")  # goes on where it was
-        time.sleep(1)
+        page.wait_for_selector("#away:not([hidden])")
         serve(tmp_path, server.port)
+        page.wait_for_selector("#away", state="hidden")
         wait_until(page, killed_at + 5)
         wait_until(page, 132)
         assert page.evaluate("window.here") == 1
@@ -101,6 +102,9 @@ def test_a_run_fills_by_itself_though_run_and_server_are_killed(page, serve, tmp
         assert page.locator("#rows tbody tr").count() == 100
         page.click("#rows >> text=Next >> nth=0")
         page.wait_for_function("document.querySelectorAll('#rows tbody tr').length === 32")
+        shutil.rmtree(tmp_path / "runs")
+        page.wait_for_selector("text=There is nothing at this address any more")
+        page.wrong[:] = [one for one in page.wrong if "404" not in one]
     finally:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)

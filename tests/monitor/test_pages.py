@@ -26,6 +26,7 @@ from benchmarks.monitor.run_view import Filter
 from benchmarks.monitor.site import Site
 from er_gym.rollout.run_directory import SPENDING, RunDirectory
 from er_gym.tasks.types import canonical_names
+from er_gym.writing import file_stem
 from tests.support import in_one_test
 
 
@@ -205,6 +206,32 @@ def test_an_episode_shows_every_step_and_the_key_actions(client, ids, runs):
         assert html.escape(step.feedback, quote=False) in shown or step.feedback in said(shown)
         done += filter(None, re.search(r'data-done="([\d,]*)"', shown)[1].split(","))
     assert sorted(map(int, done)) == list(range(len(episode.key_actions)))
+
+
+def test_an_episode_without_a_record_says_why(runs, visit, tmp_path):
+    shutil.copytree(runs / "oracle", tmp_path / "runs" / "oracle")
+    run = RunDirectory.open(tmp_path / "runs" / "oracle")
+    damaged, under_way = [record.task_id for record in run.episodes()][:2]
+    for task in (damaged, under_way):
+        file = next(run.path.glob(f"episodes/*{file_stem(task)}*"))
+        file.write_bytes(file.read_bytes()[:50])
+    events = run.path / "events.jsonl"
+    lines = [
+        line
+        for line in events.read_text().splitlines(keepends=True)
+        if not ('"episode_ended"' in line and under_way in line)
+    ]
+    events.write_text("".join(lines))
+    client = visit(tmp_path)
+    (id,) = (one.id for one in Directories([tmp_path]).all())
+    for task, expected in (
+        (damaged, "The record of this episode cannot be read: "),
+        (under_way, "This episode is being played. It can be opened when it is over."),
+    ):
+        answer = client.get(f"/runs/{id}/episode", params={"key": task})
+        assert answer.status_code == 200
+        assert expected in said(answer.text)
+    assert client.get(f"/runs/{id}/episode", params={"key": "none"}).status_code == 404
 
 
 def test_the_room_from_above_is_drawn_by_playing_again(client, ids, runs):

@@ -365,6 +365,8 @@ def test_what_makes_no_sense_in_a_session_changes_nothing(player: Player, tmp_pa
     assert player.post("/play", suite="mini", agent="oracle").status_code == 409  # one plays
     nobody = player.post("/play/nobody", do="act", action="observe", step="1")
     assert nobody.status_code == 404
+    assert "Nobody plays here any more" in nobody.text
+    assert '<a href="/play">Back</a>' in nobody.text
     assert player.client.get(f"{session}/picture?step=2").status_code == 404
     assert player.client.get(f"{session}/picture?step=1&n=-1").status_code == 404
     player.client.put(session)

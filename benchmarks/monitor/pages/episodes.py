@@ -7,11 +7,13 @@ from pathlib import Path
 
 from fastapi import Request, Response
 
+from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.episode_view import picture_file, view_of
+from benchmarks.monitor.event_tail import EpisodeRow
 from benchmarks.monitor.listing import neighbours
 from benchmarks.monitor.pages.replays import ReplayPages
 from benchmarks.monitor.run_view import Filter
-from benchmarks.monitor.site import Routes, Site, or_nothing
+from benchmarks.monitor.site import NotFound, Routes, Site, or_nothing
 from benchmarks.monitor.video import as_webp, film
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import Manifest, RunDirectory
@@ -39,8 +41,13 @@ class EpisodePages(ReplayPages):
         """An episode."""
         directory = self._site.directory(id, "run")
         chosen = Filter.of(request.query_params)
-        with or_nothing():
+        row = self._site.rows(directory).get(key)
+        try:
             episode = view_of(RunDirectory.open(directory.path), key)
+        except (ValueError, OSError) as error:
+            if row is None:
+                raise NotFound from None
+            return self._unreadable(request, directory, row, chosen, str(error))
         with self._site.runs.use(directory) as view:
             before, after = neighbours([row.key for row in view.chosen(chosen)], key)
             summary = view.summary()
@@ -54,6 +61,19 @@ class EpisodePages(ReplayPages):
             "scripts": ("episode.js", "enlarge.js"),
         }
         return self._site.show(request, "episode.html", variables)
+
+    def _unreadable(
+        self, request: Request, directory: Directory, row: EpisodeRow, chosen: Filter, why: str
+    ) -> Response:
+        """An episode without a record: it is under way, or its record is damaged."""
+        variables = {
+            "directory": directory,
+            "row": row,
+            "filter": chosen,
+            "why": "" if row.ended is None else why,
+            "live": directory.id,
+        }
+        return self._site.show(request, "episode_under_way.html", variables)
 
     def _played(self, id: str, key: str) -> tuple[Manifest, EpisodeRecord]:
         record, manifest = self._site.record(id, key)

@@ -225,7 +225,7 @@ class PlayPages:
     def _session(self, id: str) -> Session:
         session = self.sessions.get(id)
         if session is None:
-            raise NotFound
+            raise NotFound("play_gone", "/play")
         return session
 
 

@@ -3,9 +3,11 @@
 
 // Calls renew whenever an address answers otherwise than it did, at first than what is known. It
 // asks again and again, since a connection that stays open would be one of the six that a browser
-// has for all pages of a server. A page that nobody sees does not ask.
+// has for all pages of a server. A page that nobody sees does not ask. Where no answer comes, a line
+// of the page says so until one does.
 const follow = (address, known, pause, renew) => {
   let asking = false, timer = 0;
+  const away = document.getElementById("away");
   const look = async () => {
     clearTimeout(timer);
     if (document.hidden || asking) return;
@@ -13,9 +15,10 @@ const follow = (address, known, pause, renew) => {
     try {
       const answer = await fetch(address, { signal: AbortSignal.timeout(20000) });
       const now = answer.ok ? await answer.text() : `${answer.status}`;
+      away.hidden = true;
       if (now !== known) { await renew(now); known = now; }
     } catch (error) {
-      // The server is away; it is asked until it is back.
+      away.hidden = false;  // it is asked until it is back
     } finally {
       asking = false;
       timer = setTimeout(look, pause);
@@ -67,10 +70,13 @@ if (live) {
   };
   const renew = async () => {
     const answer = await fetch(location.href, { headers: { Accept: "text/html" } });
-    if (!answer.ok) return;
+    if (answer.status >= 500) throw new Error(answer.statusText);
     const page = new DOMParser().parseFromString(await answer.text(), "text/html");
     waits = false;
-    for (const fresh of page.querySelectorAll("[data-part]")) {
+    const parts = [...page.querySelectorAll("[data-part]")];
+    // The directory is gone, or what was under way is over: this is another page now.
+    if (!parts.some((fresh) => document.getElementById(fresh.id))) { location.reload(); return; }
+    for (const fresh of parts) {
       const old = document.getElementById(fresh.id);
       if (!old || old.isEqualNode(fresh)) continue;
       if (isSelected(old)) waits = true; else turnInto(old, fresh);
