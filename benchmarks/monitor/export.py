@@ -107,11 +107,13 @@ class Exported:
     Attributes:
         n: how many episodes have a replay.
         total: how many have ended.
+        first: the filter with which the list opens, as the parameters of an address.
         map: the map of the room of a replay, as HTML.
     """
 
     n: int
     total: int
+    first: str = ""
     map: Callable[[], Markup] = Markup
 
     def row(self, row: EpisodeRow) -> str:
@@ -186,7 +188,10 @@ class _Maker:
             self.keys = [row.key for row in rows[: wanted.episodes]]
             total = sum(row.ended is not None for row in view.rows.values())
         self._numbers = {key: number for number, key in enumerate(self.keys, 1)}
-        self.exported = Exported(len(self.keys), total)
+        types = {row.task_type for row in rows}
+        # The script knows types by their full names alone.
+        first = wanted.filter.query(type=wanted.filter.type if wanted.filter.type in types else "")
+        self.exported = Exported(len(self.keys), total, first)
 
     def list_page(self) -> OfflinePage:
         """The run's page with all rows."""

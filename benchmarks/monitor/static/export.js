@@ -16,6 +16,8 @@
     const rows = [...body.rows].map((row) => ({ row, told: JSON.parse(row.dataset.values) }));
     const total = document.querySelector("[data-total]");
     const usual = "-ended";
+    // The list opens with those that were chosen for replays.
+    if (!location.search) for (const [name, value] of new URLSearchParams(total.dataset.first)) query.set(name, value);
     const within = (number, bounds) => {
       const found = /^(\d*)(-?)(\d*)$/.exec(bounds);
       if (!found || bounds === "-") return true;
