@@ -15,6 +15,8 @@ Change: TypeAlias = Literal["gained", "lost", "both", "neither"]
 CHANGES: tuple[Change, ...] = ("gained", "lost", "both", "neither")
 """Which of two runs a task succeeds more often in: the second, the first; or in both as often, or
 in neither."""
+_FEWEST = 10
+"""Over fewer tasks no interval is told."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,8 @@ class Difference:
         n: tasks; ``counts``: by their change.
         first, second: success, as fractions.
         difference, low, high: second - first with its 95 % interval
-            (:func:`~benchmarks.scoring.paired.paired_difference`); None for less than two tasks.
+            (:func:`~benchmarks.scoring.paired.paired_difference`), which says too much for fewer
+            than ten tasks, or if none changed: then None.
         chance: the p value of the sign test, which is McNemar's exact one where each task was
             played once: how likely at least so unequal numbers of gained and lost tasks are if
             neither run is better.
@@ -102,7 +105,9 @@ def difference(name: str, pairs: Sequence[Pair]) -> Difference:
     if pairs:
         before = [row for pair in pairs for row in pair.first]
         estimate = paired_difference(before, [row for pair in pairs for row in pair.second])
-        mean, low, high = estimate.mean, estimate.low, estimate.high
+        mean = estimate.mean
+        if len(pairs) >= _FEWEST and counts["gained"] + counts["lost"]:
+            low, high = estimate.low, estimate.high
     return Difference(
         name=name,
         n=len(pairs),

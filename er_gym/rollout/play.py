@@ -187,4 +187,5 @@ def _stepped(info: Mapping[str, Any], reward: float, decision: Decision) -> Step
         text=_encodable(info["action_text"]),
         by=decision.by,
         causes=list(decision.causes),
+        fault=str(info.get("fault", "")),
     )

@@ -120,9 +120,11 @@ class StepRecord(GrownRecord):
         by: who decided the step in place of the agent; ``""`` if nobody did.
         causes: why the model's reply was not usable, by names of
             :data:`er_gym.rollout.causes.CAUSES`.
+        fault: the kind of fault that was injected into the action (:mod:`er_gym.envs.faults`),
+            ``""`` for none: such a failure is not the agent's.
     """
 
-    added = ("by", "causes")
+    added = ("by", "causes", "fault")
 
     verb: str
     object_type: Words = ""
@@ -137,6 +139,7 @@ class StepRecord(GrownRecord):
     appended: bool = False
     by: By = ""
     causes: list[str] = []
+    fault: str = ""
 
 
 class EpisodeRecord(GrownRecord):

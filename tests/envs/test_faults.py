@@ -21,6 +21,8 @@ from er_gym.envs.legality import KnownTypes
 from er_gym.envs.skills import Outcome
 from er_gym.envs.solver import Solver
 from er_gym.envs.wrappers import FaultInjection, KeyActionShaping
+from er_gym.rollout.agent import Decision
+from er_gym.rollout.play import play_episode
 from er_gym.tasks import verbs
 from er_gym.tasks.suites import load_suite
 from er_gym.tasks.task import Task
@@ -242,6 +244,18 @@ def test_an_action_that_is_refused_or_unknown_has_no_fault(
     for action in (f"navigate to {env.details['navigable'][0]}", "slice Apple", "hm", "observe"):
         info = env.step(action)[4]
         assert bool(info["fault"]) == action.startswith("navigate")
+
+
+def test_a_record_says_which_steps_were_faults(envs: Callable[..., EmbodiedEnv]) -> None:
+    class GoesSomewhere:
+        def reset(self, task: Task, obs: Any, info: Any) -> None: ...
+
+        def act(self, obs: Any, info: Any) -> Decision:
+            return Decision(f"navigate to {info['navigable'][0]}")
+
+    record = play_episode(envs(faults=1, max_steps=3), GoesSomewhere(), MINI[0], 1)
+    assert [bool(step.fault) for step in record.steps] == [False, True, True]
+    assert '"fault"' not in record.steps[0].model_dump_json()
 
 
 # -- the wrapper ---------------------------------------------------------------------------------

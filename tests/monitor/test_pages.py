@@ -270,6 +270,12 @@ def test_runs_are_compared_task_by_task(client, ids, runs):
         assert asked.text.count("/compare/episode") == 8 - lost
     assert client.get("/compare").status_code == 200
     assert client.get("/compare", params={"of": ["nothing"]}).status_code == 404
+    assert "too few tasks for an interval" in text
+    (other_way,) = re.findall(r'href="(\?of=[^"]+)">compare with this one', answer.text)
+    assert other_way == f"?of={ids['oracle']}&of={ids['random']}"
+    turned = client.get(f"/compare{other_way}").text
+    assert turned.index(f'value="{ids["oracle"]}"') < turned.index(f'value="{ids["random"]}"')
+    assert f"{100 * (lost - 8) / 8:+.1f}" in said(turned)
 
 
 def test_settings_are_shown_and_compared_runs_that_were_not_played_alike_are_named(

@@ -81,8 +81,12 @@ class ComparePages:
             "settings": settings,
             "unlike": [one.name for one in settings if one.differs and one.matters],
             "counted": [(counted.done, counted.failed) for counted in counts],
+            # Those that are compared, in their order: the form keeps the first one the first.
             "every": [
-                self._site.summary(directory) for directory in self._site.directories.of_kind("run")
+                self._site.summary(directory)
+                for directory in dict.fromkeys(
+                    (*directories, *self._site.directories.of_kind("run"))
+                )
             ],
             "asked": asked,
             "first": runs[0][0] if runs else None,
