@@ -50,16 +50,38 @@ def visible(text: str, most: int = 200_000) -> str:
     """A text in which characters that turn or hide text can be seen.
 
     A model can say them, and could so make a page look like another: bidirectional controls, and
-    other characters without a shape, are written as their code points. Of a longer text than
-    ``most`` the rest is left out.
+    other characters without a shape, are written as their code points. So are marks over one
+    letter beyond the fourth, which would cover the lines above. Of a longer text than ``most`` the
+    rest is left out.
     """
     shown = "".join(char if _is_plain(char) else f"⟨U+{ord(char):04X}⟩" for char in text[:most])
+    shown = _MARKS.sub(_counted_marks, shown)
     return shown + " …" if len(text) > most else shown
+
+
+def pieces(text: str) -> list[str]:
+    """A long text in pieces that a browser lays out one by one, parted between words."""
+    found = []
+    while len(text) > _PIECE:
+        at = max(text.rfind(gap, _PIECE // 2, _PIECE) for gap in ("\n", " ")) + 1 or _PIECE
+        found.append(text[:at])
+        text = text[at:]
+    return [*found, text]
 
 
 def brief(text: str) -> str:
     """As :func:`visible`, for what is usually a line."""
     return visible(text, 2_000)
+
+
+_PIECE = 4_000
+_MARK = "[\u0300-\u036f\u0483-\u0489\u1ab0-\u1aff\u1dc0-\u1dff\u20d0-\u20ff\ufe20-\ufe2f]"
+_MARKS = re.compile(f"(?<={_MARK}{{4}}){_MARK}+")
+"""Combining marks beyond the fourth in a row."""
+
+
+def _counted_marks(marks: re.Match[str]) -> str:
+    return f"⟨U+{ord(marks[0][0]):04X} …{len(marks[0])}⟩"
 
 
 _OBJECT_ID = re.compile(r"\b([A-Z]\w*)(?:\|[+-]?\d+\.\d+){3}(?:\|\w+)*")
@@ -87,6 +109,7 @@ FILTERS: Mapping[str, Callable[..., Any]] = {
     "count": count,
     "money": money,
     "visible": visible,
+    "pieces": pieces,
     "brief": brief,
     "plainly": plainly,
 }

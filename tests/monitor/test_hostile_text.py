@@ -10,6 +10,7 @@ import pytest
 
 from agents.vlm.record import ConversationRecord
 from benchmarks.monitor.directories import Directories
+from benchmarks.monitor.formats import pieces, visible
 from er_gym.rollout.events import EpisodeBegun, EventLog, RunBegun
 from er_gym.rollout.run_directory import RunDirectory
 from er_gym.writing import file_stem
@@ -100,7 +101,7 @@ def test_it_is_shown_and_changes_nothing(text, tmp_path, manifest, episode, visi
         ]
         assert [each.status_code for each in answers] == [200, 200]
         found, wanted = (seen(each.text) for each in answers)
-        long = [tag for tag in ("details", "summary", "b", "p") if len(text) > 4_000]
+        long = [tag for tag in ("details", "summary", "b", "p", "span") if len(text) > 4_000]
         assert [t for t in found.tags if t not in long] == [t for t in wanted.tags if t not in long]
         assert found.names == wanted.names
         shown = "".join(found.text)
@@ -108,7 +109,8 @@ def test_it_is_shown_and_changes_nothing(text, tmp_path, manifest, episode, visi
             assert char not in shown
         assert len(answers[0].content) < 2_500_000
     if text.isprintable() and len(text) < 4_000:
-        assert text in "".join(seen(client.get(f"/runs/{hostile.id}/episode?key={key}").text).text)
+        page = seen(client.get(f"/runs/{hostile.id}/episode?key={key}").text)
+        assert visible(text) in "".join(page.text)
 
 
 def test_a_stream_may_hold_anything(tmp_path, manifest, visit):
@@ -134,3 +136,13 @@ def test_a_stream_may_hold_anything(tmp_path, manifest, visit):
     assert "<img src=x onerror=alert(1)>" in text
     own = seen(client.get("/gone").text).tags.count("script")
     assert seen(answer.text).tags.count("script") == own
+
+
+def test_what_a_browser_lays_out_slowly_is_parted_and_counted():
+    assert visible("e" + "\u0301" * 200_000) == "e" + "\u0301" * 4 + "⟨U+0301 …199995⟩ …"
+    assert visible("Việt nǎ\u0301i") == "Việt nǎ\u0301i"
+    for text in ("A-" * 50_000, "one two\nthree " * 3_000, "a" * 3_999, ""):
+        parts = pieces(text)
+        assert "".join(parts) == text
+        assert max(map(len, parts)) <= 4_000
+    assert all(part.endswith((" ", "\n")) for part in pieces("one two\nthree " * 3_000)[:-1])
