@@ -18,7 +18,7 @@ from benchmarks.monitor.fingerprint import fingerprint
 from benchmarks.monitor.flow import flow
 from er_gym.data.collection import TRAJECTORIES, Collection
 from er_gym.data.statistics import statistics
-from er_gym.data.trajectory import Trajectory
+from er_gym.data.trajectory import Subgoal, Trajectory
 from er_gym.tasks.types import canonical_names
 
 HOSTILE = "<script>alert(1)</script> \u202e \"'><img src=x onerror=alert(1)> {{ 7 * 7 }}"
@@ -35,10 +35,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def with_thought(trajectory: Trajectory, **changes: object) -> Trajectory:
-    """The trajectory with another first thought; its first turn is not learnt."""
+    """The trajectory with another first thought; its first turn is not learnt, and has a goal."""
     turn = trajectory.turns[0]
     thought = turn.thoughts[0].model_copy(update=changes)
-    turn = turn.model_copy(update={"thoughts": [thought, *turn.thoughts[1:]], "train": False})
+    goal = Subgoal(verb="put in", thing="Apple", place="Fridge")
+    thoughts = [thought, *turn.thoughts[1:]]
+    turn = turn.model_copy(update={"thoughts": thoughts, "train": False, "subgoal": goal})
     return trajectory.model_copy(update={"turns": [turn, *trajectory.turns[1:]]})
 
 
@@ -171,6 +173,7 @@ def test_a_trajectory_is_shown_turn_by_turn(client, address, collection):
             assert " ".join(thought.text.split()) in text
     assert "refused: unseen" in text
     assert text.count("not learnt") == 1
+    assert "put in Apple → Fridge" in text
     assert html.escape(second.id) in page.text  # the next one
     pictures = [picture for turn in first.turns for picture in turn.pictures]
     beside = re.findall(r'data-step="(\d+)" data-pictures="([\d,]+)" data-stand="(\d+)"', page.text)
