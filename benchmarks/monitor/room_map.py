@@ -37,7 +37,7 @@ def room_map(world: World, wanted: Collection[str], label: str) -> Markup:
     east = max(x + w / 2 for x, _, w, _ in boxes) + _MARGIN
     south = min(z - d / 2 for _, z, _, d in boxes) - _MARGIN
     north = max(z + d / 2 for _, z, _, d in boxes) + _MARGIN
-    draw = _Draw(west, north)
+    draw = _Draw(west, north, east - west)
     marked = draw.all_wanted([each for each in world.objects if each.object_id in wanted])
     furniture = sorted((each for each in world.objects if each.holds), key=_area, reverse=True)
     body = Markup("").join(
@@ -66,10 +66,15 @@ def _sides(one: Footprint) -> tuple[float, float]:
 
 
 class _Draw:
-    """Turns the world's metres, x east and z north, into the drawing's units."""
+    """Turns the world's metres, x east and z north, into the drawing's units.
 
-    def __init__(self, west: float, north: float) -> None:
-        self._west, self._north = west, north
+    Args:
+        west, north: the drawing's left and upper edge; ``width``: how far it reaches from west to
+            east. No words cross its edges.
+    """
+
+    def __init__(self, west: float, north: float, width: float) -> None:
+        self._west, self._north, self._width = west, north, _SCALE * width
         self._words: list[tuple[float, float, float, float]] = []
 
     def free(self, left: float, middle: float, words: str) -> bool:
@@ -80,6 +85,12 @@ class _Draw:
         self._words.append((left, top, right, bottom))
         return True
 
+    def begin(self, x: float, gap: float, words: str) -> float:
+        """Where words begin that stand beside a point: to its right, else to its left."""
+        length = _LETTER * len(words)
+        right = x + gap + length > self._width
+        return max(0.0, x - gap - length) if right else x + gap
+
     def at(self, x: float, z: float) -> tuple[float, float]:
         return _SCALE * (x - self._west), _SCALE * (self._north - z)
 
@@ -89,12 +100,6 @@ class _Draw:
             '<rect class="{}" x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}"/>'
         ).format(kind, left, top, _SCALE * width, _SCALE * depth)
 
-    def text(self, kind: str, x: float, z: float, words: str) -> Markup:
-        left, top = self.at(x, z)
-        return Markup('<text class="{}" x="{:.1f}" y="{:.1f}">{}</text>').format(
-            kind, left, top, words
-        )
-
     def thing(self, one: Footprint) -> Markup:
         shown = self.box("thing", one.x, one.z, *_sides(one))
         return Markup("<g><title>{}</title>{}</g>").format(one.object_type, shown)
@@ -103,17 +108,20 @@ class _Draw:
         """The name of large furniture, where there is room for it."""
         width, depth = _sides(one)
         x, y = self.at(one.x, one.z)
-        left = x - _LETTER * len(one.object_type) / 2
+        length = _LETTER * len(one.object_type)
+        left = max(0.0, min(x - length / 2, self._width - length))
         if width * depth < _LARGE or not self.free(left, y, one.object_type):
             return Markup("")
-        return self.text("name", one.x, one.z, one.object_type)
+        return Markup('<text class="name" x="{:.1f}" y="{:.1f}">{}</text>').format(
+            left + length / 2, y, one.object_type
+        )
 
     def all_wanted(self, things: Sequence[Footprint]) -> list[Markup]:
         """The marked objects; the names of those in one place stand one below the other."""
         drawn = []
         for one in things:
             x, down = self.at(one.x, one.z)
-            while not self.free(x + 12, down, one.object_type):
+            while not self.free(self.begin(x, 12, one.object_type), down, one.object_type):
                 down += 4
             drawn.append(self.wanted(one, down))
         return drawn
@@ -124,7 +132,7 @@ class _Draw:
         return Markup(
             '<g class="wanted"><title>{}</title><circle cx="{:.1f}" cy="{:.1f}" r="9"/>'
             '<text x="{:.1f}" y="{:.1f}">{}</text></g>'
-        ).format(one.object_id, x, y, x + 12, down + 5, one.object_type)
+        ).format(one.object_id, x, y, self.begin(x, 12, one.object_type), down + 5, one.object_type)
 
     def hidden(self, one: Footprint) -> Markup:
         x, y = self.at(one.x, one.z)
@@ -132,11 +140,17 @@ class _Draw:
             '<g class="hidden-thing"><title>{} – {}</title>'
             '<rect x="{:.1f}" y="{:.1f}" width="8" height="8"/>'
             '<text x="{:.1f}" y="{:.1f}">{}</text></g>'
-        ).format(one.object_type, one.inside, x - 4, y - 4, x + 7, y + 4, one.object_type)
+        ).format(
+            one.object_type, one.inside, x - 4, y - 4,
+            self.begin(x, 7, one.object_type), y + 4, one.object_type,
+        )  # fmt: skip
 
     def way(self, stands: Collection[Stand]) -> Markup:
+        """The whole way, and a line for the part of it that lies behind the agent."""
         points = " ".join("{:.1f},{:.1f}".format(*self.at(each.x, each.z)) for each in stands)
-        return Markup('<polyline class="way" points="{}"/>').format(points)
+        return Markup(
+            '<polyline class="way to-come" points="{}"/><polyline class="way past" points=""/>'
+        ).format(points)
 
     def stands(self, stands: Collection[Stand], angle: float) -> Iterator[Markup]:
         """The agent with its view cone at every step."""

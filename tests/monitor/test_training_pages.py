@@ -134,7 +134,7 @@ def test_a_ladder_shows_its_phases_and_the_success_of_each_rung(tmp_path, visit,
     for name, kind in (("evaluations/0-base", "runs"), ("1-imitation", "training")):
         assert f'href="/{kind}/{ids[root / name]}"' in text
     results = text[text.index('id="results"') : text.index('id="phases"')]
-    assert "imitation 0 % 8 100.0 % 67.6 – 100.0 %" in said(results)
+    assert "imitation 0 % 8 100.0 % 67.6 to 100.0 %" in said(results)
     assert "this ladder: 2, 0 … 100" in text
     assert "the paper&#39;s models" in text
     listed = said(visit(tmp_path).get("/training").text)

@@ -33,6 +33,8 @@ const setUp = (player, moved) => {
     keyActions.forEach((one, place) => one.classList.toggle("done", done.has(place)));
     for (const stand of map.querySelectorAll("[data-map-step]"))
       stand.classList.toggle("now", Number(stand.dataset.mapStep) === stood);
+    const way = map.querySelector(".to-come");
+    if (way) map.querySelector(".past").setAttribute("points", way.getAttribute("points").split(" ").slice(0, stood + 1).join(" "));
     if (frame && drawn) { frame.src = frame.dataset.frame + "&n=" + stood; frame.hidden = false; }
     if (scroll && steps[now]) {  // the list alone scrolls, not the page
       const list = steps[now].parentElement;
@@ -46,11 +48,12 @@ const setUp = (player, moved) => {
   for (const step of steps) step.addEventListener("click", () => moved(Number(step.dataset.step), false));
   if (map.dataset.map) fetch(map.dataset.map).then((answer) => (answer.ok ? answer.text() : "")).then((text) => {
     map.innerHTML = text;
+    map.removeAttribute("data-wait");
     show(Number(slider.value), false);
-  }).catch(() => {});
+  }).catch(() => map.removeAttribute("data-wait"));
   player.querySelector("[data-hidden]").addEventListener("change", (event) => map.classList.toggle("with-hidden", event.target.checked));
   const draw = player.querySelector("[data-draw]");
-  if (draw) draw.addEventListener("click", () => { drawn = true; draw.hidden = true; show(Number(slider.value), false); });
+  if (draw) draw.addEventListener("click", () => { drawn = true; draw.parentElement.hidden = true; show(Number(slider.value), false); });
   return { slider, last, show };
 };
 
