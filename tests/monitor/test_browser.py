@@ -9,11 +9,15 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
+from played_collection import make_collection
+from training_runs import make_finetuning, make_policy
 
+from benchmarks.monitor.directories import Directories
 from er_gym.rollout.run_directory import RunDirectory
 
 sync_api = pytest.importorskip(
@@ -327,3 +331,42 @@ def test_it_fits_a_telephone_in_the_dark_and_in_chinese(browser, serve, runs):
 
 def brightness(colour: str) -> float:
     return sum(map(int, re.findall(r"\d+", colour)[:3])) / 3
+
+
+def test_pages_of_all_kinds_can_be_used_without_eyes_or_mouse(browser, serve, runs, tmp_path):
+    """Axe finds nothing serious on any kind of page at three widths, light and dark."""
+    source = files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
+    for name in ("oracle", "random"):
+        shutil.copytree(runs / name, tmp_path / name)
+    collection = make_collection(tmp_path / "collection", parts=("anomalies",))
+    make_finetuning(tmp_path / "finetuning")
+    make_policy(tmp_path / "policy")
+    address = serve(tmp_path, play=tmp_path / "played").address
+    ids = {each.path.name: each.id for each in Directories([tmp_path]).all()}
+    episode = next(iter(RunDirectory.open(runs / "random").episodes())).key
+    turns = next(collection.trajectories()).id
+    pages = [
+        "/", "/data", "/training", "/play", "/nothing",
+        f"/runs/{ids['oracle']}", f"/runs/{ids['random']}/episode?key={episode}",
+        f"/compare?of={ids['random']}&of={ids['oracle']}",
+        f"/compare/episode?of={ids['random']}&of={ids['oracle']}&key={episode}",
+        f"/data/{ids['collection']}", f"/data/{ids['collection']}/trajectory?key={turns}",
+        f"/training/{ids['finetuning']}", f"/training/{ids['policy']}",
+    ]  # fmt: skip
+    wrong = []
+    context = browser.new_context(bypass_csp=True, reduced_motion="reduce")
+    page = context.new_page()
+    for place in pages:
+        page.goto(address + place)
+        page.evaluate(source)
+        for width, scheme in ((1440, "light"), (900, "dark"), (360, "light")):
+            page.set_viewport_size({"width": width, "height": 900})
+            page.emulate_media(color_scheme=scheme)
+            found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
+            wrong += [
+                (place, width, scheme, one["id"], one["nodes"][0]["html"][:120])
+                for one in found["violations"]
+                if one["impact"] in ("serious", "critical")
+            ]
+    context.close()
+    assert wrong == []
