@@ -27,6 +27,7 @@ from agents.expert.thinker import ThinkingAgent
 from agents.expert.writers.base import ThoughtWriter
 from er_gym.data.trajectory import Subgoal, Trajectory
 from er_gym.envs.actions import Action
+from er_gym.envs.feedback import as_now
 from er_gym.rollout.agent import Agent, Decision, MakeAgent
 from er_gym.rollout.records import EpisodeRecord, StepRecord
 from er_gym.rollout.run_directory import RunDirectory
@@ -212,9 +213,11 @@ def _differences(trajectory: Trajectory, episode: EpisodeRecord) -> Iterator[str
         for name in ("navigable", "interactable"):
             if getattr(turn, name) != getattr(before, name):
                 yield name
-        for name in ("verb", "object_type", "object_id", "success", "reward", "feedback"):
+        for name in ("verb", "object_type", "object_id", "success", "reward"):
             if getattr(turn, name) != getattr(step, name):
                 yield name
+        if as_now(turn.feedback) != as_now(step.feedback):
+            yield "feedback"
         before = step
     if trajectory.end_reason != episode.end_reason:
         yield "end_reason"

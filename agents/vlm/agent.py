@@ -30,6 +30,7 @@ from er_gym.data.dialects import shows_anew
 from er_gym.data.scene_text import Perceived
 from er_gym.envs.actions import NO_ACTION, Action, applies
 from er_gym.envs.actions import parse as read_action
+from er_gym.envs.feedback import told_in
 from er_gym.envs.info import detail, names
 from er_gym.envs.observations import text_without_task
 from er_gym.rollout.agent import Decision, check_observation
@@ -193,16 +194,21 @@ class VLMAgent:
         last_action = LastAction(
             action=last.action,
             success=last.success,
-            feedback=last.feedback,
+            feedback=self._told(last.feedback),
             pictures=len(pictures),
             directions=tuple(pictures),
         )
         return _with_pictures(self._prompts.next(turn, last_action), pictures)
 
+    def _told(self, feedback: str) -> str:
+        """The environment's feedback in the language of the prompts."""
+        return told_in(self._settings.prompts.language, feedback)
+
     def _told_problem(self, problem: str, info: Mapping[str, Any]) -> str:
         """The message after a reply without a usable action."""
         if self._prompts.as_recorded and self._last_action is not None:
-            problem = info["feedback"]  # an action that no object of the type allows
+            # An action that no object of the type allows.
+            problem = self._told(info["feedback"])
         said = info["action_text"]
         return self._prompts.feedback(
             problem=problem,

@@ -84,18 +84,6 @@ def _counted_marks(marks: re.Match[str]) -> str:
     return f"⟨U+{ord(marks[0][0]):04X} …{len(marks[0])}⟩"
 
 
-_OBJECT_ID = re.compile(r"\b([A-Z]\w*)(?:\|[+-]?\d+\.\d+){3}(?:\|\w+)*")
-_OBJECT_NAME = re.compile(r"\b([A-Z][A-Za-z]*)_[0-9a-f]{8}\b")
-_BY_VECTOR = re.compile(r" by \((?:-?\d+\.\d+(?:, )?){3}\)")
-
-
-def plainly(text: str) -> str:
-    """Feedback for a person: things by their type instead of the engine's ids, and no vectors."""
-    text = _OBJECT_ID.sub(r"\1", text)
-    text = _OBJECT_NAME.sub(r"\1", text)
-    return _BY_VECTOR.sub("", text).replace("Agent 0", "you")
-
-
 def _is_plain(char: str) -> bool:
     return char.isprintable() or char in "\n\t"
 
@@ -111,6 +99,5 @@ FILTERS: Mapping[str, Callable[..., Any]] = {
     "visible": visible,
     "pieces": pieces,
     "brief": brief,
-    "plainly": plainly,
 }
 """The functions by their names in templates."""

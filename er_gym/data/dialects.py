@@ -37,6 +37,7 @@ from er_gym.data.trajectory import (
     ThoughtKind,
     Trajectory,
 )
+from er_gym.envs.feedback import as_now, told_in
 from er_gym.tasks import verbs
 from er_gym.tasks.files import validated
 from er_gym.tasks.reading import read_yaml
@@ -192,12 +193,14 @@ class Dialect:
 
         Args:
             trajectory: what was seen, thought and done.
-            language: of the dialect's texts; by default the language of the thoughts.
+            language: of the dialect's texts and of the feedback; by default the language of the
+                thoughts.
 
         Raises:
             ValueError: the dialect lacks the language.
         """
-        texts = self.texts_in(language or trajectory.language)
+        language = language or trajectory.language
+        texts = self.texts_in(language)
         turns: list[ChatTurn] = []
         if system := system_text(texts, trajectory.instruction):
             turns.append(ChatTurn("system", (system,)))
@@ -211,7 +214,8 @@ class Dialect:
             seen = _seen(texts, trajectory, index, now, before, last)
             reply = _reply(texts, trajectory, index, seen)
             turns.append(ChatTurn("assistant", (reply,), turn.train))
-            before, last = now, ActionResult(str(turn.action), turn.success, turn.feedback)
+            answer = told_in(language, as_now(turn.feedback))
+            before, last = now, ActionResult(str(turn.action), turn.success, answer)
         return Chat(trajectory.id, tuple(turns), texts.reply_told)
 
 

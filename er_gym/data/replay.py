@@ -10,6 +10,7 @@ from er_gym.data.reenactment import Reenactment
 from er_gym.data.shown_pictures import Album
 from er_gym.data.trajectory import SeenObject, Trajectory, Turn
 from er_gym.envs.actions import NO_ACTION
+from er_gym.envs.feedback import as_now
 from er_gym.envs.info import with_details
 from er_gym.rollout.play import Playable
 from er_gym.rollout.records import ERROR
@@ -85,4 +86,4 @@ def _came_of(turn: Turn, info: Mapping[str, Any], reward: float) -> Iterator[str
     yield from compared("object_id", turn.object_id, info["object_id"])
     yield from compared("fault", turn.fault, info["fault"])
     if turn.verb != ERROR:  # that feedback quotes what was said
-        yield from compared("feedback", turn.feedback, writable(info["feedback"]))
+        yield from compared("feedback", as_now(turn.feedback), writable(info["feedback"]))

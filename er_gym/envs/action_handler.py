@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs import legality, object_selection, skills
+from er_gym.envs import feedback_words, legality, object_selection, skills
 from er_gym.envs.actions import Action
 from er_gym.envs.legality import AvailableObjects, KnownTypes
 from er_gym.envs.perception import Perception
@@ -151,7 +151,7 @@ class DefaultActionHandler:
         objects = perception.objects
         able = objects.of_type(object_type)
         if not able:
-            return "", Outcome(None, False, f"there is no {object_type} any more")
+            return "", Outcome(None, False, feedback_words.GONE(thing=object_type))
         if setup.instances == object_selection.TARGET:
             goal = object_selection.select_for_task(
                 setup.task, now.left, verbs.NAVIGATE, able, objects

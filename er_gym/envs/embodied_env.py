@@ -68,7 +68,8 @@ class EmbodiedEnv(SavedEpisode, gymnasium.Env[dict[str, Any], Any]):
       in an environment that draws.
     - ``end`` says that the task is done.
 
-    An illegal action costs a step and changes nothing; ``info["feedback"]`` says why.
+    An illegal action costs a step and changes nothing; ``info["feedback"]`` says why, in plain
+    words. ``info["error_message"]`` has what the simulator itself said.
 
     ## Observation Space
     ``Dict`` of what ``obs_mode`` asks for, joined with ``+``:

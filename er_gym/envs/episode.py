@@ -14,11 +14,12 @@ from typing import Any, NamedTuple, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.envs import skills
+from er_gym.envs import feedback_words, skills
 from er_gym.envs.action_handler import ActionHandler, EpisodeSetup, StepContext
 from er_gym.envs.actions import Action, AnyAction
 from er_gym.envs.asked_goal import goal_row
 from er_gym.envs.faults import FaultPlan, FaultyActionHandler
+from er_gym.envs.feedback import failed
 from er_gym.envs.info import REPEATED, Details, Info, LegalActions
 from er_gym.envs.legality import KnownTypes
 from er_gym.envs.observations import MAX_REPEATS, Memory, Observation, Situation, text_of
@@ -77,6 +78,7 @@ class _Telling(NamedTuple):
     success: bool
     object_id: str
     feedback: str
+    error_message: str
     views: Mapping[str, Perception]
     appended: bool
 
@@ -136,8 +138,7 @@ class Episode:
         self._make_handler(pose)
         placed = skills.place(controller, pose)
         self._perceive(placed)
-        feedback = "You look around the room."
-        return self._told(None, "", placed.success, "", feedback, {})
+        return self._told(None, "", placed.success, "", feedback_words.BEGUN(), placed.error, {})
 
     def _floor(self) -> skills.Reachable:
         key = (self._backend, self.task.scene, self._settings.grid_size)
@@ -175,6 +176,7 @@ class Episode:
             "fault": self._fault,
             "action": told.action and [told.action.verb, told.action.object_type],
             "told": [told.text, told.success, told.object_id, told.feedback, told.appended],
+            "error_message": told.error_message,
             "views": {name: list(astuple(view.pose)) for name, view in told.views.items()},
         }
 
@@ -206,7 +208,8 @@ class Episode:
         self._available = self._handler.available_objects(self.perception)
         action = None if state["action"] is None else Action(*state["action"])
         text, success, object_id, feedback, appended = state["told"]
-        return self._told(action, text, success, object_id, feedback, views, appended)
+        error = state.get("error_message", "")  # older snapshots lack it
+        return self._told(action, text, success, object_id, feedback, error, views, appended)
 
     @property
     def max_steps(self) -> int:
@@ -242,9 +245,7 @@ class Episode:
         if understood == self._memory.last and self._memory.repeats >= MAX_REPEATS:
             self.end_reason = REPEATED
             times = self._memory.repeats + 1
-            feedback = (
-                f"You have tried to {understood} {times} times in a row, so the episode ends."
-            )
+            feedback = feedback_words.REPEATED(action=understood, times=times)
             said = self._protocol.repeated or understood
             return self._reply(said, text, False, "", feedback, 0.0)
         self._steps += understood.verb != verbs.END or self._protocol.end_is_step
@@ -267,7 +268,9 @@ class Episode:
             self.end_reason = "step limit"
         feedback = refused or _feedback(understood, outcome)
         return self._reply(
-            understood, text, outcome.success, object_id, feedback, reward, outcome.views
+            *(understood, text, outcome.success, object_id, feedback, reward),
+            views=outcome.views,
+            error_message=outcome.error,
         )
 
     def _perceive(self, outcome: skills.Outcome) -> None:
@@ -324,9 +327,10 @@ class Episode:
         elif self._replies_left == 0:
             self.end_reason = "step limit"
         quoted = text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
-        feedback = (
-            f"{quoted!r} names no action. Say one of: {', '.join(verbs.BARE_VERBS)}; or one of "
-            f"{', '.join(verbs.OBJECT_VERBS)} with an object type, such as 'navigate to Fridge'."
+        feedback = feedback_words.NO_ACTION(
+            quoted=repr(quoted),
+            alone=", ".join(verbs.BARE_VERBS),
+            others=", ".join(verbs.OBJECT_VERBS),
         )
         return self._reply(None, text, False, "", feedback, 0.0)
 
@@ -341,13 +345,16 @@ class Episode:
         feedback: str,
         reward: float,
         views: Mapping[str, Perception] | None = None,
+        error_message: str = "",
     ) -> StepResult:
         truncated = self.end_reason == "step limit"
         terminated = bool(self.end_reason) and not truncated
         appended = self._protocol.appends_end and self.end_reason in _CUT_OFF
         if appended:
             reward += self._judge(Action(verbs.END), skills.Outcome(None, True), "")
-        obs, info = self._told(action, text, success, object_id, feedback, views or {}, appended)
+        obs, info = self._told(
+            action, text, success, object_id, feedback, error_message, views or {}, appended
+        )
         return obs, reward, terminated, truncated, info
 
     def picture(self, perception: Perception) -> NDArray[np.uint8] | None:
@@ -361,11 +368,14 @@ class Episode:
         success: bool,
         object_id: str,
         feedback: str,
+        error_message: str,
         views: Mapping[str, Perception],
         appended: bool = False,
     ) -> ResetResult:
         """The observation and ``info`` after ``reset`` or a step."""
-        self._telling = _Telling(action, text, success, object_id, feedback, views, appended)
+        self._telling = _Telling(
+            action, text, success, object_id, feedback, error_message, views, appended
+        )
         perception, available, progress = self.perception, self._available, self._progress
         situation = self._situation = Situation(
             perception=perception,
@@ -392,6 +402,7 @@ class Episode:
             "action_success": success,
             "object_id": object_id,
             "feedback": feedback,
+            "error_message": error_message,
             "held": perception.held_name,
             "visible_mask": perception.visible_types.astype(np.int8),
             "navigable_mask": self._known.types.astype(np.int8),
@@ -457,5 +468,5 @@ class Episode:
 
 def _feedback(action: Action, outcome: skills.Outcome) -> str:
     if outcome.success:
-        return f"Done: {action}."
-    return f"You could not {action}: {outcome.problem}"
+        return feedback_words.DONE(action=action)
+    return failed(action, outcome.problem, outcome.error)

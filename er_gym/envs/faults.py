@@ -16,13 +16,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.envs import feedback_words
 from er_gym.envs.action_handler import ActionHandler, ExecutedAction, StepContext
 from er_gym.envs.actions import Action
 from er_gym.envs.arguments import number, short_repr
@@ -50,13 +51,12 @@ KINDS = tuple(KIND_OF_VERB.values())
 MOST_IN_A_ROW = 2
 """After this many faults in a row, the same action is carried out."""
 _ARM_FAILED = {
-    "open": "your hand slipped, and it is still closed",
-    "close": "your hand slipped, and it is still open",
-    "pickup": "it slipped out of your grip, and your hand is still empty",
-    "put": "your arm missed the place, and you still hold what you held",
-    "toggle": "your hand missed the switch, and nothing changed",
+    "open": feedback_words.FAULT_OPEN,
+    "close": feedback_words.FAULT_CLOSE,
+    "pickup": feedback_words.FAULT_PICKUP,
+    "put": feedback_words.FAULT_PUT,
+    "toggle": feedback_words.FAULT_TOGGLE,
 }
-_NOWHERE_ELSE = "you did not get there, and are still where you were"
 _STREAM = 0xFA017
 """Sets the random numbers of faults apart from others that come from the same seed."""
 
@@ -217,7 +217,7 @@ class FaultyActionHandler:
         self._in_a_row[action] += 1
         if kind == NAVIGATE:
             return self._arrive_elsewhere(action, now)
-        return "", Outcome(None, False, _ARM_FAILED[kind])
+        return "", Outcome(None, False, _ARM_FAILED[kind]())
 
     def state(self) -> dict[str, Any]:
         """The protocol's, and which faults are still to come."""
@@ -236,11 +236,12 @@ class FaultyActionHandler:
         objects = now.perception.objects
         places = other_places(action.object_type, self._known.names, objects, self.navigated_to)
         if not places:
-            return "", Outcome(None, False, _NOWHERE_ELSE)
+            return "", Outcome(None, False, feedback_words.NOWHERE_ELSE())
         place = places[int(self._random.integers(len(places)))]
         object_id, arrived = self._inner.execute(Action(verbs.NAVIGATE, place), now)
-        problem = f"you arrived at {place} instead" if arrived.success else _NOWHERE_ELSE
-        return object_id if arrived.success else "", Outcome(arrived.perception, False, problem)
+        if not arrived.success:
+            return "", replace(arrived, problem=feedback_words.NOWHERE_ELSE())
+        return object_id, Outcome(arrived.perception, False, feedback_words.ASTRAY(thing=place))
 
 
 def other_places(

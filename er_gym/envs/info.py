@@ -95,7 +95,11 @@ class Info(TypedDict):
     object_id: str
     """The object that the action was done to, ``""`` for none."""
     feedback: str
-    """What the environment tells the agent about the action, a sentence or two."""
+    """What the environment tells the agent about the action, a sentence or two: in English, with
+    types and plain words (:func:`er_gym.envs.feedback.told_in` has it in other languages)."""
+    error_message: str
+    """AI2-THOR's own message on an action that it refused, ``""`` for none. It names objects by ids
+    and states positions. It is for records: an agent should not read it."""
     held: str
     """The type of the object in the agent's hand, ``""`` for none."""
     visible_mask: NDArray[np.int8]

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.envs import feedback_words
 from er_gym.envs.actions import ACTIONS, INDEX, INDICES, Action, applies
 from er_gym.envs.perception import Perception, type_mask, type_names
 from er_gym.tasks import verbs
@@ -103,14 +104,11 @@ def _hand_fits(verb: Verb, table: ObjectTable) -> bool:
 def _hand_problem(action: Action, verb: Verb, table: ObjectTable) -> str:
     """Why the hand does not fit a verb, in words for the agent."""
     if verb.hand == verbs.EMPTY:
-        return f"You hold {table.type_of(table.held)} already; put it down first."
+        return feedback_words.HAND_FULL(thing=table.type_of(table.held))
     if verb.hand == verbs.FULL:
-        return "Your hand is empty; pick something up first."
-    tools = [f"{'an' if name[0] in 'AEIOU' else 'a'} {name}" for name in verb.hand]
-    return (
-        f"You cannot {action} without {verb.tool or ' or '.join(tools)} in your hand; "
-        f"pick up {' or '.join(tools)} first."
-    )
+        return feedback_words.HAND_EMPTY()
+    tools = " or ".join(f"{'an' if name[0] in 'AEIOU' else 'a'} {name}" for name in verb.hand)
+    return feedback_words.NO_TOOL(action=action, tool=verb.tool or tools, tools=tools)
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,10 +284,7 @@ def illegal_reason(action: Action, available: AvailableObjects, known: KnownType
     if action.verb == verbs.NAVIGATE:
         if name in known:
             return ""
-        return (
-            f"You cannot navigate to {name}: none has been close enough to see clearly. "
-            f"You could go to: {_listing(known.names)}."
-        )
+        return feedback_words.NOT_KNOWN(thing=name, places=_listing(known.names))
     if candidate_rows(action, available):
         return ""
     if applies(action.verb, name):
@@ -297,11 +292,10 @@ def illegal_reason(action: Action, available: AvailableObjects, known: KnownType
             return _hand_problem(action, verb, objects)
         in_hand = verb.in_hand and objects.held >= 0 and objects.type_of(objects.held) == name
         if not available.interactable_types[KIND_OF[name]] and not in_hand:
-            return (
-                f"You cannot {action}: none is within reach and in view. "
-                f"There is: {_listing(available.in_reach)}."
-            )
-    return f"You cannot {action}. {verb.otherwise or 'It is not in the state for that.'}"
+            places = _listing(available.in_reach)
+            return feedback_words.OUT_OF_REACH(action=action, places=places)
+    why = verb.otherwise or feedback_words.WRONG_STATE()
+    return feedback_words.NOT_FIT(action=action, why=why)
 
 
 def legal_actions(available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.envs import feedback_words
 from er_gym.envs.action_handler import EpisodeSetup, ExecutedAction, StepContext
 from er_gym.envs.actions import INDEX, INDICES, NO_ACTION, Action, AnyAction, text_of
 from er_gym.envs.legality import AvailableObjects, KnownTypes, navigable_within
@@ -123,10 +124,10 @@ class PaperActionHandler:
         if action.verb in (verbs.INIT, *_BARE):
             return ""
         if action.verb == verbs.NAVIGATE:
-            return "" if name in known else f"You cannot navigate to {name or 'nothing'}."
+            return "" if name in known else feedback_words.PAPER_PLACE(thing=name or "nothing")
         if name in available.in_reach:
             return ""
-        return f"You cannot {action.verb} {name or 'nothing'}: it is not available for interaction."
+        return feedback_words.PAPER_REACH(action=f"{action.verb} {name or 'nothing'}")
 
     def legal(self, available: AvailableObjects, known: KnownTypes) -> NDArray[np.int8]:
         """(len(ACTIONS),) int8: 1 for the paper's interactions with all types within reach."""
@@ -150,7 +151,7 @@ class PaperActionHandler:
             return "", start_again(controller, setup.start)
         target = self._choose(action, now.perception.objects)
         if target is None:
-            return "", Outcome(None, False, f"there is no such {action.object_type}")
+            return "", Outcome(None, False, feedback_words.NONE_SUCH(thing=action.object_type))
         if action.verb != verbs.NAVIGATE:
             return target.object_id, interact(controller, action.verb, target)
         aim = self._on_it(target)

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from er_gym.envs.feedback_words import PAPER_WAY
 from er_gym.envs.perception import perceive
 from er_gym.envs.skills import Outcome, Reachable
 from er_gym.tasks.task import AgentPose
@@ -151,12 +152,12 @@ def approach(controller: Any, target: ObjectSnapshot, stated: AgentPose | None) 
     refused: list[Pose] = []
     pose = stated or _choose(controller, target, refused)
     if pose is None:
-        return Outcome(None, False, f"no way was found to {target.object_type}")
+        return Outcome(None, False, PAPER_WAY(thing=target.object_type))
     while not teleport(controller, pose):
         refused.append({"x": pose.x, "y": pose.y, "z": pose.z})
         pose = _choose(controller, target, refused)
         if pose is None:
-            return Outcome(None, False, f"no way was found to {target.object_type}")
+            return Outcome(None, False, PAPER_WAY(thing=target.object_type))
     if stated is None:
         _adjust_height(controller, target)
         _look_at(controller, target)

@@ -21,10 +21,10 @@ _LEFT, _RIGHT = "Left", "Right"
 
 def outcome_after(controller: Any) -> Outcome:
     """The outcome of a skill after its calls: the perception, and the error of the last call."""
-    problem = controller.last_event.metadata["errorMessage"]
+    error = controller.last_event.metadata["errorMessage"]
     if not controller.headless:
         controller.step(action="Pass")  # to draw the one picture needed
-    return Outcome(perceive(controller.last_event), not problem, problem)
+    return Outcome(perceive(controller.last_event), not error, error=error)
 
 
 def start_again(controller: Any, start: AgentPose) -> Outcome:
@@ -43,9 +43,9 @@ def observe(controller: Any) -> Outcome:
         return perceive(controller.step(action="RotateLeft", degrees=90))
 
     left, behind, right, last = turned(), turned(), turned(), turned()
-    problem = controller.last_event.metadata["errorMessage"]
+    error = controller.last_event.metadata["errorMessage"]
     views = dict(zip(VIEWS, (right, behind, left), strict=True))
-    return Outcome(last, not problem, problem, views)
+    return Outcome(last, not error, views=views, error=error)
 
 
 def _call(verb_to_action: str, **fixed: Any) -> Callable[[Any, ObjectSnapshot], Any]:
@@ -67,8 +67,8 @@ _INTERACTIONS: dict[str, Callable[[Any, ObjectSnapshot], Any]] = {
 def interact(controller: Any, verb: str, target: ObjectSnapshot) -> Outcome:
     """Pick up, put into, open, close or toggle an object, as far as AI2-THOR allows."""
     event = _INTERACTIONS[verb](controller, target)
-    problem = event.metadata["errorMessage"]
-    return Outcome(perceive(event), not problem, problem)
+    error = event.metadata["errorMessage"]
+    return Outcome(perceive(event), not error, error=error)
 
 
 # -- move forward ----------------------------------------------------------------------------------

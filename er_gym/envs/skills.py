@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.envs import feedback_words
 from er_gym.envs.perception import Perception, perception_of
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import BASIN_OF
@@ -89,18 +90,22 @@ class Outcome:
     Attributes:
         perception: what the agent perceives afterwards; None if that has not changed.
         success: whether the skill succeeded.
-        problem: why it failed, ``""`` if it succeeded.
+        problem: why it failed, in words for the agent; ``""`` if it succeeded, or if only ``error``
+            says why.
         views: after ``observe``, direction to what the agent perceives there.
+        error: AI2-THOR's message, ``""`` for none; not for the agent.
     """
 
     perception: Perception | None
     success: bool
     problem: str = ""
     views: Mapping[str, Perception] = field(default_factory=dict)
+    error: str = ""
 
 
 def _outcome(calls: Calls, result: Result) -> Outcome:
-    return Outcome(perception_of(calls.seen()), *result)
+    success, error = result
+    return Outcome(perception_of(calls.seen()), success, error=error)
 
 
 def place(controller: Any, pose: AgentPose, *, force: bool = False) -> Outcome:
@@ -177,7 +182,7 @@ def navigate(controller: Any, perception: Perception, goal: int, floor: Reachabl
         found = _interactable_poses(controller, object_id, positions, _ROTATIONS, _HORIZONS)
         if found:
             return place(controller, min(found, key=discomfort))
-    problem = f"no way was found to where {objects.type_of(goal)} can be seen"
+    problem = feedback_words.NO_WAY(thing=objects.type_of(goal))
     return replace(place(controller, perception.pose), success=False, problem=problem)
 
 

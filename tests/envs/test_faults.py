@@ -87,7 +87,7 @@ def test_a_faulty_navigation_arrives_elsewhere(envs: Callable[..., EmbodiedEnv])
     _, reward, _, _, info = env.step(f"navigate to {goal}")
     place = info["object_id"].split("|")[0]
     assert (info["action_success"], info["fault"], reward) == (False, "navigate", 0)
-    assert info["feedback"] == f"You could not navigate to {goal}: you arrived at {place} instead"
+    assert info["feedback"] == f"You could not navigate to {goal}: you arrived at {place} instead."
     assert place in known
     assert place != goal
     assert env.agent_pose != before

@@ -21,7 +21,6 @@ from agents.vlm.clients.scripted import ScriptedClient
 from agents.vlm.record import ConversationRecord, RoundRecord
 from benchmarks.cli.main import main
 from benchmarks.monitor.app import make_app
-from benchmarks.monitor.formats import plainly
 from benchmarks.monitor.language import words_in
 from benchmarks.monitor.play.plan import plan, run_path
 from benchmarks.monitor.play.session import Refused
@@ -151,18 +150,6 @@ def test_what_is_chosen_is_begun_and_no_other_type(player: Player) -> None:
     assert 'value="oracle"' in page
     assert FIRST.id in page
     assert page.count("<option value=") < 60
-
-
-def test_feedback_for_a_person_names_types() -> None:
-    for said, plain in (
-        ("Bread_9e2edca9 is blocking Agent 0 from moving by (0.0000, 0.0000, -0.1000).",
-         "Bread is blocking you from moving."),
-        ("No valid positions to place Statue: SideTable|+11.38|+00.00|-01.16 has no free space.",
-         "No valid positions to place Statue: SideTable has no free space."),
-        ("Sink|-01.00|+00.50|+02.25|SinkBasin is full.", "Sink is full."),
-        ("Done: navigate to Cabinet_2.", "Done: navigate to Cabinet_2."),
-    ):  # fmt: skip
-        assert plainly(said) == plain
 
 
 def test_playing_leaves_the_run_that_bench_writes(

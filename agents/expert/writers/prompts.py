@@ -18,6 +18,7 @@ from agents.vlm.prompt_set import interleave_pictures, without_marks
 from agents.vlm.template_files import TemplateFiles
 from er_gym.data.knowledge import Knowledge
 from er_gym.data.trajectory import TAG_OF_KIND, Language, SeenObject
+from er_gym.envs.feedback import as_now, told_in
 from er_gym.tasks.suites import config_directory
 from er_gym.tasks.task import Task
 
@@ -108,7 +109,7 @@ class WriterPrompts:
             pictures=len(pictures),
             directions=tuple(known.views),
             task=known.instruction,
-            history=tuple(_history(known)),
+            history=tuple(_history(known, self.language)),
             views=tuple(self._views(known)),
             held=self._named(known.held),
             decision=str(known.decision),
@@ -191,7 +192,7 @@ class WriterPrompts:
         )
 
 
-def _history(known: Knowledge) -> Iterable[_Past]:
+def _history(known: Knowledge, language: Language) -> Iterable[_Past]:
     pairs = zip(known.actions, known.earlier, strict=True)
     for number, (done, thoughts) in enumerate(pairs, 1):
         yield _Past(
@@ -199,7 +200,7 @@ def _history(known: Knowledge) -> Iterable[_Past]:
             thoughts=tuple(without_marks(thought.text) for thought in thoughts),
             action=str(done.action),
             success=done.success,
-            feedback=without_marks(done.feedback),
+            feedback=without_marks(told_in(language, as_now(done.feedback))),
         )
 
 

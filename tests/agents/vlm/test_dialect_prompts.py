@@ -165,6 +165,12 @@ def test_a_model_is_told_what_it_was_tuned_on(
         options = settings(dialect, one.trajectory.language)
         sent = told(env, one, options, spoken(chat))
         assert as_sent(sent) == as_trained(chat, one.files)[:-1]
+        if options.prompts.language == "zh":  # it has been told of a failed step, in its language
+            told_words = "".join(
+                part for each in sent for part in each.parts if isinstance(part, str)
+            )
+            assert "看清过" in told_words
+            assert "You could" not in told_words
         for before, turn in zip(one.trajectory.turns, one.trajectory.turns[1:], strict=False):
             kinds.add((before.verb if before.success else "", len(turn.pictures)))
     wanted = {(verbs.OBSERVE, 3), (verbs.MOVE_FORWARD, 1), (verbs.NAVIGATE, 1), ("", 0), ("", 1)}
