@@ -10,9 +10,9 @@ from typing import Any, Generic, TypeVar
 import yaml
 from pydantic import BaseModel, ConfigDict
 
+from er_gym.tasks.config_folder import config_directory
 from er_gym.tasks.files import validated
 from er_gym.tasks.reading import parse_yaml, read_yaml
-from er_gym.tasks.suites import config_directory
 
 Settings = TypeVar("Settings", bound=BaseModel)
 

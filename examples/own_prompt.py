@@ -14,7 +14,7 @@ from pathlib import Path
 import er_gym
 from agents.factory import AgentFactory
 from agents.vlm.settings import AgentSettings
-from er_gym.tasks.suites import config_directory
+from er_gym.tasks.config_folder import config_directory
 
 SYSTEM = """You are a robot in a room. Think in one short sentence, then choose one action:
 <Thinking>The mug may be in the fridge.</Thinking><DecisionMaking>open Fridge</DecisionMaking>

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from er_gym.data.trajectory import Language, Purpose, Subgoal
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import same_type
-from er_gym.tasks.generate.words import in_or_on_the
 from er_gym.tasks.task import KeyAction, Task, type_of_id
+from er_gym.tasks.wordings.words import in_or_on_the
 
 _AIDS = (verbs.OPEN, verbs.CLOSE)
 

@@ -21,8 +21,8 @@ from agents.vlm.prompt_set import (
 )
 from agents.vlm.template_files import LARGEST, TemplateFiles
 from er_gym.tasks import verbs
+from er_gym.tasks.config_folder import config_directory
 from er_gym.tasks.reading import parse_yaml, read_text
-from er_gym.tasks.suites import config_directory
 from er_gym.tasks.verbs import Verb
 
 _TEMPLATES = ("system.jinja", "first.jinja", "next.jinja", "feedback.jinja")

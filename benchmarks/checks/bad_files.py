@@ -9,9 +9,10 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+from er_gym.tasks.config_folder import config_directory
 from er_gym.tasks.jsonl_format import FORMAT, write_tasks
 from er_gym.tasks.paper_format import write_tasks as write_paper_tasks
-from er_gym.tasks.suites import config_directory, load_suite
+from er_gym.tasks.suites import load_suite
 
 HOSTILE = "\x1b[31mred\x1b]0;title\x07 [bold]x[/] \u202e\u009b31m"
 """Control codes of a terminal, markup of Rich, and a character that reorders a line."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
@@ -24,6 +24,7 @@ from benchmarks.cli.executor import ExecutorOptions, Workforce, with_executor_op
 from benchmarks.cli.options import (
     EXISTING_FILE,
     FOLDER,
+    LANGUAGES,
     MOST_SAMPLES,
     MOST_SEED,
     OptionGroup,
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
     from er_gym.rollout.runner import RunSummary
     from er_gym.tasks.suites import Suite
     from er_gym.tasks.task import Task
+    from er_gym.tasks.wordings.instructions import Language
 
 TRACKERS = ("tensorboard", "trackio")
 """As in ``benchmarks.cli.trackers``, which imports more; a test compares."""
@@ -65,6 +67,10 @@ class BenchOptions(OptionGroup):
         type=click.IntRange(0, MOST_SEED),
         metavar="SEED",
         help="Play new tasks, made as the suite's configuration says, from another seed.",
+    )
+    language: str | None = option(
+        type=click.Choice(LANGUAGES),
+        help="The language of the instructions.  [default: that of the tasks]",
     )
     tasks_file: Path | None = option(type=EXISTING_FILE, help="A task file in the paper's format.")
     poses: Path | None = option(
@@ -303,6 +309,7 @@ def _load_suite(options: BenchOptions, workers: int | None) -> Suite:
     from er_gym.envs.protocol import PAPER
     from er_gym.tasks.jsonl_format import digest
     from er_gym.tasks.paper_format import read_poses, with_every_pose, with_poses
+    from er_gym.tasks.suites import told_in
 
     if options.fresh is None:
         suite = suite_given(options.suite, options.tasks_file)
@@ -310,6 +317,8 @@ def _load_suite(options: BenchOptions, workers: int | None) -> Suite:
         raise BadInput("give --fresh or --tasks-file, not both")
     else:
         suite = fresh_suite(options.suite, options.fresh, workers or 1)
+    if options.language is not None:
+        suite = told_in(suite, cast("Language", options.language))
     if options.poses is not None and options.tasks_file is None:
         raise BadInput("--poses needs --tasks-file; a suite has its own poses")
     stated = {} if options.poses is None else read_poses(options.poses)

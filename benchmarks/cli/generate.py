@@ -13,7 +13,7 @@ import click
 from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
-from benchmarks.cli.options import FILE, MOST_SEED, Span, force_option, split
+from benchmarks.cli.options import FILE, LANGUAGES, MOST_SEED, Span, force_option, split
 from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ _DEFAULT_TOTAL = 100
 @click.option(
     "--scenes",
     metavar="NAMES",
-    help="all, training, validation, evaluation, or scenes separated by commas.",
+    help="all, training, strict, evaluation, or scenes separated by commas.",
 )
 @click.option("--types", metavar="NAMES", help="Task types, separated by commas.  [default: all]")
 @click.option(
@@ -55,6 +55,11 @@ _DEFAULT_TOTAL = 100
     "--distractors", type=Span(), help="How many other objects of the named types there are."
 )
 @click.option("--distance", type=Span(), help="How far the agent has to go, metres.")
+@click.option(
+    "--language",
+    type=click.Choice(LANGUAGES),
+    help="The language of the instructions.  [default: the suite's, or en]",
+)
 @click.option("--seed", type=click.IntRange(0, MOST_SEED), help="[default: the suite's, or 0]")
 @click.option(
     "--paraphraser",
@@ -170,10 +175,14 @@ def _order(
     stem = out.name.removesuffix(".gz").removesuffix(".jsonl")
     for name, value in told.items():
         parts += [f"--{name.replace('_', '-')}", _option_value(value)]
+    if "scenes" in told:
+        base.pop("left_out", None)  # of the configuration's own scenes
     if "scenes" in told and told["scenes"] not in SCENES:
         told["scenes"] = tuple(split(told["scenes"]))
     if "types" in told:
         told["types"] = canonical_names(split(told["types"]))
+    if paraphraser and told.get("language", "en") != "en":
+        raise BadInput("--paraphraser asks for English wordings; leave --language out")
     seed = seed if seed is not None else config.seed if config else 0
     parts += ["--seed", str(seed), *(["--paraphraser", paraphraser] if paraphraser else [])]
     plain = config is not None and not told
@@ -277,15 +286,15 @@ def _paraphrased(task: Task, paraphrase: Any) -> Task:
 
     from er_gym.tasks.paraphrase import choose, names_in
 
-    kept = {*names_in(task.instruction), *_switch_words(task)}
-    variants = paraphrase(task.instruction, kept)
+    kept = {*names_in(task.name), *_switch_words(task)}
+    variants = paraphrase(task.name, kept)
     return replace(
         task, instruction=choose((task.instruction, *variants), f"{task.id} in other words")
     )
 
 
 def _switch_words(task: Task) -> set[str]:
-    """The words "on" and "off" where the instruction uses them of a goal."""
+    """The words "on" and "off" where the task's name uses them of a goal."""
     states: Mapping[object, str] = {True: "on", False: "off"}
     ways = {
         states[value]
@@ -293,5 +302,5 @@ def _switch_words(task: Task) -> set[str]:
         for name, value in condition.state
         if name == "isToggled"
     }
-    words = set(task.instruction.lower().replace(".", " ").replace("?", " ").split())
+    words = set(task.name.lower().replace(".", " ").replace("?", " ").split())
     return ways & words

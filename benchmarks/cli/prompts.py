@@ -114,7 +114,7 @@ def _sets() -> Mapping[str, _Kind]:
 
 
 def _folder(name: str, kind: _Kind) -> Path:
-    from er_gym.tasks.suites import config_directory
+    from er_gym.tasks.config_folder import config_directory
 
     return config_directory(kind.folder) / name
 

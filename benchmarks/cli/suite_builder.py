@@ -30,6 +30,7 @@ from er_gym.tasks.generate import Generator, generator_for, select_balanced
 from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME
+from er_gym.tasks.wordings.instructions import half_unseen, in_language
 from er_gym.thor import make_controller
 from er_gym.writing import make_folder
 
@@ -141,7 +142,9 @@ def build_suite(
     for scene in spec.rooms:
         every = every.plus(done[scene])
     chosen = select_balanced(every.tasks, spec.total, random.Random(seed))
-    return BuildResult(tuple(_layouts_together(chosen)), every.dropped)
+    kept = [task for task in chosen if task.scene not in spec.left_out]
+    told = in_language(half_unseen(kept) if spec.unseen_wordings else kept, spec.language)
+    return BuildResult(tuple(_layouts_together(told)), every.dropped)
 
 
 def parts_folder(out: Path, spec: SuiteSpec, seed: int) -> Path:

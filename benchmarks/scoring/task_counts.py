@@ -9,7 +9,7 @@ from benchmarks.scoring.tables import print_tables
 from benchmarks.terminal import stdout
 from er_gym.tables import Table
 from er_gym.tasks.room_kinds import ROOM_KINDS, room_kind
-from er_gym.tasks.splits import split
+from er_gym.tasks.splits import split, wording
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME
 
@@ -38,6 +38,8 @@ def print_counts(
     found = [Table("Tasks", ("Group", "Type", *ROOM_KINDS, "all"), tuple(rows), 2)]
     if by_scene:
         found += [_scene_table(chosen), _count_table("Splits", Counter(map(split, chosen)))]
+        told = Counter(f"in {wording(task) or 'other'} wordings" for task in chosen)
+        found.append(_count_table("Wordings", told))
     if dropped:
         found.append(_count_table("Dropped", dropped))
     print_tables(found, stdout())

@@ -39,9 +39,9 @@ from er_gym.data.trajectory import (
 )
 from er_gym.envs.feedback import as_now, told_in
 from er_gym.tasks import verbs
+from er_gym.tasks.config_folder import config_directory
 from er_gym.tasks.files import validated
 from er_gym.tasks.reading import read_yaml
-from er_gym.tasks.suites import config_directory
 
 SEEN: ThoughtKind = "analysis"
 """The kind of thought by which an assistant tells what it sees."""

@@ -18,9 +18,9 @@ from er_gym.data.dialects import DialectTexts, dialect_names, load_dialect
 from er_gym.data.exports.paper import DECISION
 from er_gym.data.exports.sharegpt import FEEDBACK_TOKEN
 from er_gym.data.trajectory import TAG_OF_KIND, Language, ThoughtKind, ThoughtRecord
+from er_gym.tasks.config_folder import config_directory
 from er_gym.tasks.files import validated
 from er_gym.tasks.reading import read_yaml
-from er_gym.tasks.suites import config_directory
 
 WRITER = "imported"
 _KIND_OF_TAG = {tag: kind for kind, tag in TAG_OF_KIND.items()}

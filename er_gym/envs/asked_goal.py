@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.tasks import verbs
+from er_gym.tasks.wordings.names import SYNONYMS, apart, chinese_names
 from er_gym.thor.objects import KIND_OF, TYPES
 
 GOAL_VERBS: Mapping[str, str] = {
@@ -25,18 +26,39 @@ GOAL_VERBS: Mapping[str, str] = {
 """The words of an instruction that say what to do, by their meaning. The words of the verbs that
 other packages add are included."""
 
+_CHINESE: Mapping[str, str] = {
+    "search": "找|搜|寻|看",
+    "pickup": "拿|取|捡|握",
+    "put": "放|搁|摆",
+    "toggle": "打开|关掉",
+    "then": "先|再|然后|之后|接着|最后|随后",
+}
+"""The same in Chinese, where to open a door and to switch on a lamp is one word."""
+_PLACE_OF = re.compile("[里上]的(?!咖啡(?!机|杯|桌))")
+_IN_CHINESE = re.compile(r"[\u4e00-\u9fff]")
+
 
 @cache
 def _named() -> Sequence[tuple[str, str, re.Pattern[str]]]:
-    """The object types, the longest names first, each with its first word in small letters, and
-    with how an instruction names it."""
+    """The object types, the longest names first, each with the first word of a name in small
+    letters, and with how an instruction has that name."""
+    names = [(kind, apart(kind)) for kind in TYPES]
+    names += [(kind, other) for kind, parts in SYNONYMS.items() for other in parts.all]
     found = []
-    for name in sorted(TYPES, key=len, reverse=True):
-        words = re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z]+|\d+", name)
-        apart = r"[\s-]?".join(words)
-        pattern = re.compile(rf"\b{apart}(?:s|es)?\b", re.IGNORECASE)
-        found.append((name, words[0].lower(), pattern))
+    for kind, name in sorted(names, key=lambda each: len(each[1]), reverse=True):
+        first, *others = name.split()
+        spaced = r"[\s-]?".join((first, *others))
+        pattern = re.compile(rf"\b{spaced}(?:s|es)?\b", re.IGNORECASE)
+        found.append((kind, first.lower(), pattern))
     return found
+
+
+@cache
+def _named_in_chinese() -> tuple[re.Pattern[str], Mapping[str, str]]:
+    """How a Chinese instruction names types, the longest names first, and the types by name."""
+    kinds = {name: kind for kind, parts in chinese_names().items() for name in parts.all}
+    kinds |= {kind: kind for kind in TYPES if kind not in chinese_names()}
+    return re.compile("|".join(sorted(kinds, key=len, reverse=True))), kinds
 
 
 @cache
@@ -53,6 +75,8 @@ def goal(instruction: str) -> tuple[tuple[float, ...], tuple[tuple[str, float], 
         instruction names: 1 for the first, then 1/2, 1/3 and so on. ``credit card`` names a
         CreditCard. A name inside a longer name in the same place does not count.
     """
+    if _IN_CHINESE.search(instruction):
+        return _goal_in_chinese(instruction)
     mentions = []
     taken = np.zeros(len(instruction) + 1, dtype=bool)
     small = instruction.casefold()
@@ -64,9 +88,31 @@ def goal(instruction: str) -> tuple[tuple[float, ...], tuple[tuple[str, float], 
             if not taken[span].any():
                 taken[span] = True
                 mentions.append((match.start(), name))
-    order = list(dict.fromkeys(name for _, name in sorted(mentions)))
     asked = tuple(float(bool(pattern.search(instruction))) for pattern in _asked())
-    return asked, tuple((name, 1.0 / (rank + 1)) for rank, name in enumerate(order))
+    return asked, _weighted(name for _, name in sorted(mentions))
+
+
+def _goal_in_chinese(
+    instruction: str,
+) -> tuple[tuple[float, ...], tuple[tuple[str, float], ...]]:
+    named, kinds = _named_in_chinese()
+    order: list[str] = []
+    places: list[str] = []  # 冰箱里的苹果: the apple, then the fridge
+    for match in named.finditer(instruction):
+        kind = kinds[match.group()]
+        if _PLACE_OF.match(instruction, match.end()):
+            places.append(kind)
+        else:
+            order += [kind, *places]
+            places.clear()
+    order += places
+    rest = named.sub("", instruction)
+    asked = (verb in _CHINESE and re.search(_CHINESE[verb], rest) for verb in GOAL_VERBS)
+    return tuple(float(bool(each)) for each in asked), _weighted(order)
+
+
+def _weighted(names: Iterable[str]) -> tuple[tuple[str, float], ...]:
+    return tuple((name, 1.0 / (rank + 1)) for rank, name in enumerate(dict.fromkeys(names)))
 
 
 @lru_cache(maxsize=4096)

@@ -9,10 +9,10 @@ from textwrap import fill
 
 from er_gym.tasks import verbs
 from er_gym.tasks.difficulty import Difficulty
-from er_gym.tasks.generate.words import PLURAL, in_or_on_the, pronoun, with_article
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import KeyAction, Task, type_of_id
+from er_gym.tasks.wordings.words import PLURAL, in_or_on_the, pronoun, with_article
 
 _WIDTH = 100
 

@@ -12,6 +12,7 @@ from er_gym.tables import Table
 from er_gym.tasks import jsonl_format, verbs
 from er_gym.tasks.difficulty import hidden_depth, length
 from er_gym.tasks.room_kinds import ROOM_KINDS, room_kind
+from er_gym.tasks.splits import wording
 from er_gym.tasks.task import Task, type_of_id
 from er_gym.tasks.types import BY_NAME, GROUPS
 from er_gym.thor import OBJECT_TYPES
@@ -41,6 +42,7 @@ class Summary:
             ascending.
         rearranged: the number of tasks with moved objects.
         layouts: the number of different arrangements of these tasks.
+        wordings: ``seen``, ``unseen``, and ``other`` for instructions in no wording of er-gym.
     """
 
     tasks: int
@@ -54,6 +56,7 @@ class Summary:
     depths: Mapping[int, int]
     rearranged: int
     layouts: int
+    wordings: Mapping[str, int]
 
 
 def subject_type(task: Task) -> str:
@@ -97,6 +100,7 @@ def summarise(tasks: Iterable[Task]) -> Summary:
         lengths={number: lengths[number] for number in sorted(lengths)},
         depths={number: depths[number] for number in sorted(depths)},
         rearranged=len(rearranged),
+        wordings=_in_order(("seen", "unseen", "other"), (wording(t) or "other" for t in tasks)),
         layouts=len({(task.scene, task.arrangement.layout) for task in rearranged}),
     )
 
@@ -156,6 +160,9 @@ def _counts(summary: Summary) -> list[str]:
     return [
         "## Types",
         _types(summary),
+        "## Wordings",
+        _prose("Tasks by whether training has tasks in the wording of their instruction:"),
+        _tally(summary.wordings),
         "## Scenes",
         _across("Room", summary.room_kinds),
         _scenes(summary),

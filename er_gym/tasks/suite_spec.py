@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from er_gym.tasks.difficulty import Difficulty
 from er_gym.tasks.splits import SCENES
 from er_gym.tasks.types import canonical_names
+from er_gym.tasks.wordings.instructions import Language
 from er_gym.thor import SCENE_NAMES
 
 Span = tuple[float, float | None]
@@ -26,8 +27,13 @@ class SuiteSpec(BaseModel):
         layouts: the number of arrangements of each scene, besides the recorded one.
         recorded: whether tasks begin in the recorded arrangement, too.
         per_layout: the number of candidates of each type from each arrangement.
-        unseen_objects: whether tasks may be about the types that training does not see
+        unseen_objects: whether tasks may be about the types that training is not about
             (:data:`~er_gym.tasks.splits.UNSEEN_TYPES`).
+        unseen_wordings: whether half of the tasks of each type are told in wordings that training
+            does not see (:func:`~er_gym.tasks.wordings.instructions.half_unseen`).
+        language: the language of the instructions.
+        left_out: further scenes, whose tasks are made and chosen with the others and dropped then:
+            so a suite that gives a room up keeps its other tasks.
         hidden_depth, distractors, distance: the allowed difficulty
             (:class:`~er_gym.tasks.difficulty.Difficulty`; distance in metres).
     """
@@ -41,6 +47,9 @@ class SuiteSpec(BaseModel):
     recorded: bool = True
     per_layout: int = Field(3, gt=0)
     unseen_objects: bool = True
+    unseen_wordings: bool = False
+    language: Language = "en"
+    left_out: tuple[str, ...] = ()
     hidden_depth: Span = (0, None)
     distractors: Span = (0, None)
     distance: Span = (0, None)
@@ -56,6 +65,14 @@ class SuiteSpec(BaseModel):
                 f"unknown scene {''.join(unknown[:1])!r}; "
                 f"give names such as FloorPlan1, or one of: {', '.join(SCENES)}"
             )
+        return scenes
+
+    @field_validator("left_out")
+    @classmethod
+    def _known_left_out(cls, scenes: tuple[str, ...]) -> tuple[str, ...]:
+        unknown = [name for name in scenes if name not in SCENE_NAMES]
+        if unknown:
+            raise ValueError(f"unknown scene {unknown[0]!r}; give names such as FloorPlan1")
         return scenes
 
     @field_validator("types")
@@ -79,10 +96,14 @@ class SuiteSpec(BaseModel):
 
     @property
     def rooms(self) -> Sequence[str]:
-        """The names of the scenes, each once."""
+        """The names of the scenes in which tasks are made, each once; of those left out, too."""
         if isinstance(self.scenes, str):
-            return SCENES.get(self.scenes, (self.scenes,))
-        return tuple(dict.fromkeys(self.scenes))
+            rooms = SCENES.get(self.scenes, (self.scenes,))
+        else:
+            rooms = tuple(dict.fromkeys(self.scenes))
+        if self.left_out:
+            return tuple(name for name in SCENE_NAMES if name in (*rooms, *self.left_out))
+        return rooms
 
     @property
     def allows_any_difficulty(self) -> bool:

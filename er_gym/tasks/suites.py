@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
@@ -18,11 +18,13 @@ from pydantic import BaseModel, ConfigDict
 
 from er_gym.plugins import PluginError, Registry, error_line
 from er_gym.tasks import jsonl_format, paper_format
+from er_gym.tasks.config_folder import config_directory
 from er_gym.tasks.errors import SetAsideTask, TaskFileError, summarise_set_aside
 from er_gym.tasks.files import validated
 from er_gym.tasks.reading import read_yaml
 from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import Task
+from er_gym.tasks.wordings.instructions import Language, in_language
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _LONGEST_QUOTE = 80
@@ -95,13 +97,23 @@ def suite_registry() -> Registry[Suite | Callable[[], Suite]]:
     )
 
 
-def load_suite(name: str) -> Suite:
+def load_suite(name: str, language: Language | None = None) -> Suite:
     """Load a suite: er-gym's own or another package's by its name, or ``package.module:function``.
 
+    Args:
+        name: of the suite; ``NAME-zh`` is er-gym's suite ``NAME`` in Chinese.
+        language: of the instructions; None for the suite's own.
+
     Raises:
-        ValueError: there is no such suite; the message lists the known suites.
+        ValueError: there is no such suite, and the message lists the known suites; or one of its
+            tasks cannot be told in the language.
         TaskFileError: one of its files is damaged, or the suite has not been generated yet.
     """
+    if language is not None:
+        return told_in(load_suite(name), language)
+    own, _, code = name.rpartition("-")
+    if code == "zh" and own in suite_names():
+        return load_suite(own, "zh")
     found = suite_registry().get(name)
     if name in suite_names() and not isinstance(found, Suite):
         return found()
@@ -114,6 +126,23 @@ def load_suite(name: str) -> Suite:
     if not isinstance(suite, Suite):
         raise PluginError(f"suite {name!r} makes {type(suite).__name__}; give an {__name__}.Suite")
     return suite
+
+
+def told_in(suite: Suite, language: Language) -> Suite:
+    """The suite with its instructions in a language; in Chinese it is named ``NAME-zh``.
+
+    Raises:
+        ValueError: one of its tasks cannot be told in it.
+    """
+    tasks = in_language(suite.tasks, language)
+    if tasks == suite.tasks:
+        return suite
+    return replace(
+        suite,
+        name=suite.name.removesuffix("-zh") + ("" if language == "en" else f"-{language}"),
+        tasks=tasks,
+        digest=jsonl_format.digest(tasks),
+    )
 
 
 def own_tasks(name: str) -> tuple[Task, ...]:
@@ -138,14 +167,21 @@ def _read_own(file: Path, changed: int) -> tuple[Task, ...]:
 
 
 def comes_with_er_gym(suite: Suite) -> bool:
-    """Whether each task of a suite is one of a suite that comes with er-gym, unchanged.
+    """Whether each task of a suite is one of a suite that comes with er-gym, unchanged but for its
+    instruction.
 
     The embedded engine has every object of such tasks: each was played before it was kept.
     """
-    if suite.name not in suite_names() or suite_file(suite.name).parent != _DATA:
+    name = suite.name.removesuffix("-zh")
+    if name not in suite_names() or suite_file(name).parent != _DATA:
         return False
-    own = {id(task) for task in own_tasks(suite.name)}
-    return all(id(task) in own for task in suite.tasks)
+    own = {task.id: task for task in own_tasks(name)}
+    return all(
+        (same := own.get(task.id)) is not None
+        and task.key_actions is same.key_actions  # read from the same file
+        and (task is same or replace(task, instruction=same.instruction) == same)
+        for task in suite.tasks
+    )
 
 
 def _own_suite(name: str) -> Suite:
@@ -211,12 +247,3 @@ def suite_from_file(path: str | Path) -> Suite:
         set_aside=found.set_aside,
         places=found.places,
     )
-
-
-def config_directory(kind: str) -> Path:
-    """The folder of the configurations of a kind, such as ``suites``.
-
-    A wheel has configs/ inside the package, a checkout has it beside the package.
-    """
-    inside = _PACKAGE / "configs" / kind
-    return inside if inside.is_dir() else _PACKAGE.parent / "configs" / kind

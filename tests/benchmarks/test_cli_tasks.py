@@ -214,15 +214,15 @@ def test_a_language_model_words_some_of_the_tasks(tmp_path: Path) -> None:
     assert 0 < len(others) < 8
     for one, other in others:
         assert one.instruction in (
-            f"Robot, hear me: {other.instruction}",
-            f"This is what I ask of you: {other.instruction}",
+            f"Robot, hear me: {other.name}",
+            f"This is what I ask of you: {other.name}",
         )
-        assert names_in(one.instruction) == names_in(other.instruction)
+        assert names_in(one.instruction) == names_in(other.name)
     assert [replace(one, instruction=other.instruction) for one, other in pairs] == plain
     assert digest(worded) in out.with_name("worded.md").read_text(encoding="utf-8")
 
     asked = (folder / "asked.txt").read_text().splitlines()
-    assert sorted(asked) == sorted({task.instruction for task in plain})
+    assert sorted(asked) == sorted({task.name for task in plain})
     (cache,) = out.parent.glob("worded*paraphrases.jsonl")
     replies = [json.loads(line) for line in cache.read_text().splitlines()]
     assert [reply["instruction"] for reply in replies] == asked

@@ -8,10 +8,16 @@ from pathlib import Path
 import pytest
 
 from benchmarks.scoring.report import load_run
-from benchmarks.scoring.splits import SPLITS, split_of_episode, split_results
+from benchmarks.scoring.splits import (
+    SPLITS,
+    STRICT,
+    WORDINGS,
+    split_of_episode,
+    split_results,
+)
 from er_gym.rollout.records import record_episode
 from er_gym.rollout.run_directory import Manifest, RunDirectory
-from er_gym.tasks.splits import split
+from er_gym.tasks.splits import is_strictly_unseen, split, subject_types, wording
 from er_gym.tasks.suites import load_suite
 
 
@@ -24,7 +30,7 @@ def test_a_record_is_of_the_split_of_its_task(suite: str) -> None:
 
 
 def test_every_episode_is_in_one_row(tmp_path: Path) -> None:
-    tasks = load_suite("er-1k").tasks[::50]
+    tasks = load_suite("er-1k").tasks[::25]
     manifest = Manifest(
         suite="er-1k", suite_digest="x", suite_size=1000, agent="x", env={}, seed=0, er_gym="0"
     )
@@ -33,6 +39,11 @@ def test_every_episode_is_in_one_row(tmp_path: Path) -> None:
         run.write(record_episode(task, agent="x", seed=0, end_reason="end"))
     rows = split_results([load_run(run.path)])
     counts = Counter(map(split, tasks))
-    assert {row.split: row.summary.n for row in rows} == dict(counts)
-    assert [row.split for row in rows] == [name for name in SPLITS if name in counts]
-    assert len(counts) > 1
+    told = Counter(f"{wording(task)} wording" for task in tasks)
+    strict = Counter(STRICT for task in tasks if is_strictly_unseen(subject_types(task)))
+    every = counts + told + strict
+    assert {row.split: row.summary.n for row in rows} == dict(every)
+    names = (*SPLITS, STRICT, *WORDINGS.values())
+    assert [row.split for row in rows] == [name for name in names if name in every]
+    assert min(map(len, (counts, told))) > 1
+    assert strict

@@ -231,7 +231,8 @@ def test_a_changed_task_and_a_file_of_the_same_name_do_not_come_with_er_gym(tmp_
     suite = load_suite("mini")
     first, *others = suite.tasks
     assert comes_with_er_gym(suite)
-    assert not comes_with_er_gym(replace(suite, tasks=(replace(first, instruction="?"), *others)))
+    assert comes_with_er_gym(replace(suite, tasks=(replace(first, instruction="?"), *others)))
+    assert not comes_with_er_gym(replace(suite, tasks=(replace(first, goal=()), *others)))
     assert not comes_with_er_gym(replace(suite, name="another"))
     jsonl_format.write_tasks(tmp_path / "mini.jsonl", suite.tasks)
     assert not comes_with_er_gym(suite_from_file(tmp_path / "mini.jsonl"))

@@ -32,7 +32,7 @@ def taking(object_id: str, scene: str) -> Task:
 def test_rooms_are_for_training_or_for_evaluation() -> None:
     assert set(TRAINING_SCENES).isdisjoint(EVALUATION_SCENES)
     assert {*TRAINING_SCENES, *EVALUATION_SCENES} < set(SCENE_NAMES) == set(SCENES["all"])
-    assert len(TRAINING_SCENES) == 105
+    assert len(TRAINING_SCENES) == 104
     assert (SCENES["training"], SCENES["evaluation"]) == (TRAINING_SCENES, EVALUATION_SCENES)
 
 
@@ -48,7 +48,7 @@ def test_the_papers_test_tasks_play_in_no_training_room(shared_data: Path) -> No
     assert short == set(EVALUATION_SCENES)
     # Some long-range ones play elsewhere; these rooms are for neither.
     assert {task.scene for task in tasks} - short == (
-        set(SCENE_NAMES) - set(TRAINING_SCENES) - set(EVALUATION_SCENES)
+        set(SCENE_NAMES) - set(TRAINING_SCENES) - set(EVALUATION_SCENES) - {"FloorPlan7"}
     )
 
 

@@ -44,7 +44,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "a set that is none": (
         {"total": 1, "scenes": "test"},
         "unknown scene 'test'; give names such as FloorPlan1, or one of: all, training, "
-        "validation, evaluation",
+        "strict, evaluation",
     ),
     "a room that is none": ({"total": 1, "scenes": ["FloorPlan1", "Hall"]}, "unknown scene 'Hall'"),
     "a set among rooms": ({"total": 1, "scenes": ["training"]}, "unknown scene 'training'"),

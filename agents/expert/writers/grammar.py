@@ -27,8 +27,8 @@ from functools import lru_cache
 from typing import Any, TypeAlias
 
 from agents.expert.writers.nouns import Nouns
+from er_gym.tasks.config_folder import config_directory
 from er_gym.tasks.reading import read_yaml
-from er_gym.tasks.suites import config_directory
 
 Facts: TypeAlias = Mapping[str, Any]
 """A fact is an object type or another text, a flag, the facts of one thing, or a pool: a tuple of

@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from er_gym.tasks.generate.words import HOLLOW, PLURAL, UNCOUNTED
+from er_gym.tasks.config_folder import config_directory
 from er_gym.tasks.reading import read_yaml
-from er_gym.tasks.suites import config_directory
+from er_gym.tasks.wordings.words import HOLLOW, PLURAL, UNCOUNTED
 from er_gym.thor import OBJECT_TYPES
 
 _FIRST_NAME = 0.6

@@ -19,7 +19,7 @@ from agents.vlm.template_files import TemplateFiles
 from er_gym.data.knowledge import Knowledge
 from er_gym.data.trajectory import TAG_OF_KIND, Language, SeenObject
 from er_gym.envs.feedback import as_now, told_in
-from er_gym.tasks.suites import config_directory
+from er_gym.tasks.config_folder import config_directory
 from er_gym.tasks.task import Task
 
 OWN_PROFILE = "expert"

@@ -8,35 +8,30 @@ Redundant goals are then merged: finding an object in order to take it is one go
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
+from agents.scripted.searcher.chinese import read_chinese
+from agents.scripted.searcher.goals import (
+    BREW,
+    CHILL,
+    CLOSE,
+    FIND,
+    HEAT,
+    OPEN,
+    PUT,
+    SLICE,
+    TAKE,
+    TOAST,
+    TOGGLE,
+    WASH,
+    Goal,
+    tidied,
+)
 from er_gym.envs.actions import applies
 from er_gym.tasks import verbs
+from er_gym.tasks.wordings.names import SYNONYMS
 from er_gym.thor import OBJECT_TYPES
-
-FIND, TAKE, PUT, TOGGLE = "find", "take", "put", "toggle"
-WASH, BREW, HEAT, CHILL, TOAST, SLICE = "wash", "brew", "heat", "chill", "toast", "slice"
-OPEN, CLOSE = "open", "close"
-
-
-@dataclass(frozen=True)
-class Goal:
-    """One goal of an instruction.
-
-    Attributes:
-        kind: :data:`FIND`, :data:`TAKE` and so on.
-        object_type: the type of the object.
-        target: the receptacle type to put it into, or the knife to slice it with; "" for none.
-        source: the receptacle type that the instruction says holds the object; "" if it names none.
-    """
-
-    kind: str
-    object_type: str
-    target: str = ""
-    source: str = ""
-
 
 _VERBS = {
     FIND: "find finding found search searching locate locating look looking spot see seeing"
@@ -59,6 +54,7 @@ _VERBS = {
 }
 _KIND = {word: kind for kind, words in _VERBS.items() for word in words.split()}
 _SYNONYMS = {
+    **{name: kind for kind, parts in SYNONYMS.items() for name in parts.all},
     "refrigerator": "Fridge", "fridge": "Fridge", "stove": "StoveBurner", "burner": "StoveBurner",
     "fire": "StoveBurner", "counter": "CounterTop", "tap": "Faucet", "tv": "Television",
     "couch": "Sofa", "armchair": "ArmChair", "phone": "CellPhone", "bin": "GarbageCan",
@@ -91,15 +87,17 @@ _NAMES = {
     **{f"type{index}": name for index, name in enumerate(OBJECT_TYPES)},
     **{f"also{index}": name for index, name in enumerate(_SYNONYMS.values())},
 }
+_SPELLINGS = {
+    **{f"type{index}": _spelling(name) for index, name in enumerate(OBJECT_TYPES)},
+    **{f"also{index}": rf"{name}(?:s|es)?" for index, name in enumerate(_SYNONYMS)},
+}
 _TOKEN = re.compile(
     "|".join(
         [
             *(
-                rf"(?P<{group}>\b{_spelling(name)}\b)"
-                for group, name in sorted(_NAMES.items(), key=lambda item: -len(item[1]))
-                if group.startswith("type")
+                rf"(?P<{group}>\b{spelling}\b)"
+                for group, spelling in sorted(_SPELLINGS.items(), key=lambda item: -len(item[1]))
             ),
-            *(rf"(?P<also{index}>\b{word}(?:s|es)?\b)" for index, word in enumerate(_SYNONYMS)),
             r"(?P<word>\w+)",
             r"(?P<mark>[.,;:?!])",
         ]
@@ -153,11 +151,14 @@ class _Reader:
     def _before(self, position: int) -> str:
         """The word before, without articles and adjectives."""
         named = bool(self.words[position][1])
+        article = False
         while position > 0:
             position -= 1
             word = self.words[position][0]
-            if not named or (word not in _ARTICLES and word not in _ADJECTIVES):
+            adjective = word in _ADJECTIVES and not article  # "to clean the Cup" is a verb
+            if not named or not (word in _ARTICLES or adjective):
                 return word
+            article |= word in _ARTICLES
         return ""
 
     def _next(self, position: int) -> str:
@@ -262,28 +263,6 @@ class _Reader:
         return tidied(self.goals)
 
 
-def tidied(goals: Iterable[Goal]) -> list[Goal]:
-    """Goals without those that others include; repeated goals are kept."""
-    kept: list[Goal] = []
-    for goal in goals:
-        last = kept[-1] if kept else None
-        if last is not None:
-            if goal.kind == FIND and goal.object_type == last.object_type:
-                continue
-            same = goal.object_type == last.object_type
-            if same and last.kind in (FIND, TAKE) and goal.kind not in (OPEN, CLOSE):
-                kept[-1] = goal if goal.source else replace(goal, source=last.source)
-                continue
-            if goal == last or (same and goal.kind == last.kind and goal.target == last.target):
-                continue
-            if same and goal.kind == TAKE and last.kind not in (FIND, PUT):
-                continue
-            if goal.kind == TOGGLE and last.kind == HEAT and goal.object_type == "Microwave":
-                continue
-        kept.append(goal)
-    return kept
-
-
 def _first_things_first(instruction: str) -> str:
     """ "Before you do B, do A" rewritten as "Do A. Then do B"."""
     return re.sub(
@@ -295,6 +274,7 @@ def _first_things_first(instruction: str) -> str:
 
 
 _LONGEST = 2_000
+_CHINESE = re.compile(r"[\u4e00-\u9fff]")
 
 
 @lru_cache(maxsize=4096)
@@ -304,6 +284,8 @@ def parse_instruction(instruction: str) -> tuple[Goal, ...]:
     Only its first 2,000 characters are read, each run of white space as one.
     """
     instruction = " ".join(instruction.split())[:_LONGEST]
+    if _CHINESE.search(instruction):
+        return tuple(tidied(read_chinese(instruction)))
     text = re.sub(r"'s\b", "", _first_things_first(instruction))
     text = re.sub(
         r"([^.?!,;]+?),?\s+after\s+(?:having\s+)?((?!that|this)\w+ing\s[^.?!,;]+)",

@@ -8,9 +8,9 @@ from itertools import cycle, islice
 from er_gym.tasks.generate.plan_builder import PlanBuilder
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
-from er_gym.tasks.generate.templates import MOVE_TWO
 from er_gym.tasks.generate.transport import transfers
-from er_gym.tasks.generate.words import in_or_on_the
+from er_gym.tasks.wordings.english import ENGLISH
+from er_gym.tasks.wordings.words import in_or_on_the
 
 _PARTNERS = 2
 """How many second transfers follow each first one."""
@@ -59,6 +59,6 @@ RULES = (
         "ordered_pickup_two_object_and_put",
         choices=_sequences,
         plan=sequence,
-        instructions=from_templates(MOVE_TWO),
+        instructions=from_templates(ENGLISH.templates["move two"].seen),
     ),
 )

@@ -16,11 +16,12 @@ from er_gym.tasks.generate.plan_builder import ImpossiblePlan
 from er_gym.tasks.generate.rules import all_rules
 from er_gym.tasks.generate.scene_graph import Accepts, SceneGraph, SceneObject, read_scene_graph
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule
-from er_gym.tasks.generate.words import in_or_on_the, pronoun, verb_to_be, with_article
 from er_gym.tasks.goal import Condition, unmet_conditions
 from er_gym.tasks.room_kinds import room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME, canonical_names, task_type
+from er_gym.tasks.wordings.instructions import instruction
+from er_gym.tasks.wordings.words import in_or_on_the, subject_words
 from er_gym.thor import accepts as thor_accepts
 
 AMBIGUOUS = "the words fit several objects, which ask for different actions"
@@ -169,6 +170,7 @@ class Generator:
         task_id = self._id(rule, plan, named)
         words = {**self._words(plan, named), **plan.words}
         instructions = rule.instructions(words)
+        name = instructions[0]
         gone_to = [action.object_id for action in plan.key_actions if action.verb == verbs.NAVIGATE]
         ids = {obj.type: obj.id for obj in named}
         return Task(
@@ -176,8 +178,9 @@ class Generator:
             type=BY_NAME[rule.type],
             scene=self.scene,
             # Not hash(): it differs between processes.
-            instruction=instructions[zlib.crc32(task_id.encode()) % len(instructions)],
-            name=instructions[0],
+            instruction=instruction(name, task_id, self.scene)
+            or instructions[zlib.crc32(task_id.encode()) % len(instructions)],
+            name=name,
             key_actions=plan.key_actions,
             target_objects=tuple(dict.fromkeys(gone_to)),
             related_objects=plan.related,
@@ -203,17 +206,9 @@ class Generator:
     def _words(self, plan: TaskPlan, named: Sequence[SceneObject]) -> dict[str, str]:
         words = {"room": room_kind(self.scene)}
         for prefix, obj in zip(("", "second_"), plan.subjects, strict=False):
-            name, one = obj.type, with_article(obj.type)
-            if obj in named:
-                where = in_or_on_the(self.scene_graph.place_of(obj).type)
-                name = f"{obj.type} that {verb_to_be(obj.type)} {where}"
-                one = f"the {name}"
-            words |= {
-                f"{prefix}object": name,
-                f"{prefix}an_object": one,
-                f"{prefix}it": pronoun(obj.type),
-                f"{prefix}is": verb_to_be(obj.type),
-            }
+            place = in_or_on_the(self.scene_graph.place_of(obj).type) if obj in named else ""
+            said = subject_words(obj.type, place)
+            words |= {f"{prefix}{field}": word for field, word in said.items()}
         return words
 
 

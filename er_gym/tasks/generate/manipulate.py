@@ -8,7 +8,7 @@ from functools import partial
 from er_gym.tasks.generate.plan_builder import PlanBuilder
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
-from er_gym.tasks.generate.templates import PICK_UP, TOGGLE
+from er_gym.tasks.wordings.english import ENGLISH
 
 NEVER_TOGGLED = frozenset({"StoveKnob", "StoveBurner", "LightSwitch"})
 
@@ -43,9 +43,14 @@ RULES = (
             name,
             choices=partial(_carried, hidden=hidden),
             plan=pickup,
-            instructions=from_templates(PICK_UP),
+            instructions=from_templates(ENGLISH.templates["pick up"].seen),
         )
         for name, hidden in (("single_pickup", False), ("single_pickup_from_closerep", True))
     ),
-    TaskRule("single_toggle", choices=_switches, plan=toggle, instructions=from_templates(TOGGLE)),
+    TaskRule(
+        "single_toggle",
+        choices=_switches,
+        plan=toggle,
+        instructions=from_templates(ENGLISH.templates["toggle"].seen),
+    ),
 )

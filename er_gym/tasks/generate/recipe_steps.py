@@ -10,8 +10,8 @@ from itertools import permutations
 from er_gym.tasks import verbs
 from er_gym.tasks.generate.plan_builder import ImpossiblePlan, PlanBuilder
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject, may_put_into
-from er_gym.tasks.generate.words import in_or_on_the
 from er_gym.tasks.verbs import Verb
+from er_gym.tasks.wordings.words import in_or_on_the
 
 
 @dataclass

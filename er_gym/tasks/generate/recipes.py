@@ -17,9 +17,9 @@ from er_gym.tasks.files import validated
 from er_gym.tasks.generate.plan_builder import ImpossiblePlan, PlanBuilder
 from er_gym.tasks.generate.recipe_steps import RecipeRun, steps
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject, largest, may_put_into
-from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, plan_from
-from er_gym.tasks.generate.templates import STYLES, in_order
+from er_gym.tasks.generate.task_plan import Filled, TaskPlan, TaskRule, plan_from
 from er_gym.tasks.reading import read_yaml
+from er_gym.tasks.wordings.english import ENGLISH, in_order
 from er_gym.thor import OBJECT_TYPES
 
 SHORTEST, LONGEST = 9, 28
@@ -172,10 +172,10 @@ def recipe_rules(recipes: Sequence[Recipe]) -> tuple[TaskRule, ...]:
     )
 
 
-def _instructions(words: Mapping[str, str | Sequence[str]]) -> list[str]:
+def _instructions(words: Mapping[str, str | Sequence[str]]) -> Sequence[str]:
     clauses = words["clauses"]
     assert not isinstance(clauses, str)
-    return [in_order(clauses, style) for style in range(STYLES)]
+    return Filled(ENGLISH.orders.seen, partial(in_order, clauses))
 
 
 def _plan(recipe: Recipe, graph: SceneGraph, *chosen: SceneObject) -> TaskPlan:

@@ -8,8 +8,8 @@ from functools import partial
 from er_gym.tasks.generate.plan_builder import PlanBuilder
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
-from er_gym.tasks.generate.templates import FIND
 from er_gym.tasks.goal import Condition
+from er_gym.tasks.wordings.english import ENGLISH
 
 
 def search(graph: SceneGraph, obj: SceneObject) -> TaskPlan:
@@ -28,7 +28,7 @@ RULES = tuple(
         name,
         choices=partial(_each, hidden=hidden),
         plan=search,
-        instructions=from_templates(FIND),
+        instructions=from_templates(ENGLISH.templates["find"].seen),
         may_name_places=False,
     )
     for name, hidden in (("single_search", False), ("single_search_from_closerep", True))

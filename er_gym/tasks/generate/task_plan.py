@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar, overload
 
 from er_gym.tasks import verbs
 from er_gym.tasks.generate.plan_builder import PlanBuilder
@@ -105,4 +106,26 @@ def from_templates(
     templates: Sequence[str],
 ) -> Callable[[Mapping[str, str | Sequence[str]]], Sequence[str]]:
     """Instructions from templates, which are filled with the plan's words."""
-    return lambda words: [template.format_map(words) for template in templates]
+    return lambda words: Filled(templates, lambda template: template.format_map(words))
+
+
+_Template = TypeVar("_Template")
+
+
+class Filled(Sequence[str]):
+    """Instructions from templates, each made when it is asked for: of hundreds, one or two are."""
+
+    def __init__(self, templates: Sequence[_Template], fill: Callable[[_Template], str]) -> None:
+        self._templates, self._fill = templates, fill
+
+    def __len__(self) -> int:
+        return len(self._templates)
+
+    @overload
+    def __getitem__(self, index: int) -> str: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[str]: ...
+    def __getitem__(self, index: int | slice) -> str | Sequence[str]:
+        if isinstance(index, slice):
+            return Filled(self._templates[index], self._fill)
+        return self._fill(self._templates[index])

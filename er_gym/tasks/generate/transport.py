@@ -8,8 +8,8 @@ from functools import partial
 from er_gym.tasks.generate.plan_builder import PlanBuilder
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject, largest, may_put_into
 from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
-from er_gym.tasks.generate.templates import MOVE
-from er_gym.tasks.generate.words import in_or_on_the
+from er_gym.tasks.wordings.english import ENGLISH
+from er_gym.tasks.wordings.words import in_or_on_the
 
 
 def transfer(graph: SceneGraph, obj: SceneObject, target: SceneObject) -> TaskPlan:
@@ -69,7 +69,7 @@ RULES = tuple(
         name,
         choices=partial(_moves, hidden=hidden, into_closed=into_closed),
         plan=transfer,
-        instructions=from_templates(MOVE),
+        instructions=from_templates(ENGLISH.templates["move"].seen),
     )
     for name, hidden, into_closed in (
         ("pickup_and_put", False, False),

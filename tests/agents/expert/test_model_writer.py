@@ -24,7 +24,7 @@ from er_gym.data.critic import check
 from er_gym.data.knowledge import Knowledge, knowledge_at
 from er_gym.data.trajectory import Language, ThoughtKind
 from er_gym.tasks import verbs
-from er_gym.tasks.suites import config_directory
+from er_gym.tasks.config_folder import config_directory
 
 Say = Callable[[Sequence[dict[str, str]]], str]
 PICTURE = Picture(b"\xff\xd8 jpeg", "image/jpeg", 160, 96)

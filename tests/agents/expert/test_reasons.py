@@ -27,7 +27,7 @@ from er_gym.data.knowledge import Knowledge, LastAction
 from er_gym.data.trajectory import SeenObject, Subgoal, Turn
 from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
-from er_gym.tasks.suites import config_directory
+from er_gym.tasks.config_folder import config_directory
 
 GO = verbs.NAVIGATE
 FRIDGE, DESK = "Fridge|+00.00|+01.00|+02.00", "Desk|+00.00|+01.00|+02.00"

@@ -67,7 +67,7 @@ def test_a_policy_learns_the_teachers_actions(make_config: Make) -> None:
 
 def test_a_run_begins_warm(make_config: Make, tmp_path: Path) -> None:
     config = make_config(
-        total_steps=256, warm_start={"teacher": "oracle", "episodes": 24, "epochs": 6}
+        total_steps=256, warm_start={"teacher": "oracle", "episodes": 24, "epochs": 20}
     )
     train(config, tmp_path / "run")
     noted = json.loads((tmp_path / "run" / "warm_start.json").read_text())

@@ -27,7 +27,7 @@ from agents.vlm.prompts import load_prompts
 from agents.vlm.settings import Prompts
 from agents.vlm.templates import _meaning
 from er_gym.tasks import verbs
-from er_gym.tasks.suites import config_directory
+from er_gym.tasks.config_folder import config_directory
 from er_gym.tasks.verbs import Verb, Words
 
 BUNDLED = [

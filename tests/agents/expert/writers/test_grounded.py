@@ -23,7 +23,7 @@ from er_gym.data.knowledge import AROUND, Knowledge, LastAction, knowledge_at
 from er_gym.data.trajectory import TAG_OF_KIND, THOUGHT_KINDS, Language, Purpose, Subgoal, Turn
 from er_gym.envs.actions import Action
 from er_gym.tasks import verbs
-from er_gym.tasks.suites import config_directory
+from er_gym.tasks.config_folder import config_directory
 from er_gym.tasks.task import Task
 from er_gym.thor import OBJECT_TYPES
 from tests.support import in_one_test

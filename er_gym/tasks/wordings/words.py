@@ -44,3 +44,18 @@ def verb_to_be(object_type: str) -> str:
 def in_or_on_the(receptacle_type: str) -> str:
     """The place of an object in a receptacle: "in the Fridge", "on the Shelf"."""
     return f"{'in' if receptacle_type in HOLLOW else 'on'} the {receptacle_type}"
+
+
+def subject_words(object_type: str, place: str = "") -> dict[str, str]:
+    """What English templates say of a thing; with ``place`` ("on the Desk") it is told from others.
+
+    Returns:
+        The fields ``object``, ``an_object``, ``it`` and ``is``.
+    """
+    name = f"{object_type} that {verb_to_be(object_type)} {place}" if place else object_type
+    return {
+        "object": name,
+        "an_object": f"the {name}" if place else with_article(object_type),
+        "it": pronoun(object_type),
+        "is": verb_to_be(object_type),
+    }
