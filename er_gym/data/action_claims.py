@@ -7,9 +7,10 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from er_gym.data.claims import PARTS
 from er_gym.data.mentions import Mention, all_interchangeable
 from er_gym.data.reading import Clause
-from er_gym.data.thought import Refusal, Thought, name_of
+from er_gym.data.thought import Refusal, Thought
 from er_gym.tasks import verbs
 from er_gym.thor import OBJECT_TYPES
 
@@ -22,8 +23,6 @@ PAST_VERB = {
     verbs.NAVIGATE: "go to",
     "searched": "search",
 }
-_NEAR = 4
-"""Letters before a claim in which a negation is one of it."""
 _RECENT = 3
 """So many actions ago, a failure can still be spoken of as the last one."""
 _LAST = re.compile(r"\b(?:last|previous|preceding)\b|上一|上次|前一|刚")
@@ -34,27 +33,6 @@ _STORY = re.compile(r"后来|才去的|之后才")
 # -- what was done ---------------------------------------------------------------------------------
 
 
-def check_history(thought: Thought) -> Iterator[Refusal]:
-    """Claims to have done an action that was not done."""
-    for clause in thought.clauses:
-        if clause.asks or clause.conditional or clause.hedged or not clause.mentions:
-            continue
-        for verb, phrases in thought.phrases.did.items():
-            for phrase in phrases:
-                for match in phrase.finditer(clause.text):
-                    if clause.negated and thought.phrases.negation.search(
-                        clause.text, max(0, match.start() - _NEAR), match.end()
-                    ):
-                        continue
-                    for mention in clause.named(match, "y" if verb == verbs.PUT else "x"):
-                        if not has_done(thought, verb, mention):
-                            yield Refusal(
-                                "history",
-                                f"The agent did not {PAST_VERB[verb]} {name_of(mention)} before. "
-                                "Do not claim it.",
-                            )
-
-
 def has_done(thought: Thought, verb: str, mention: Mention) -> bool:
     """Whether the agent did that to something of that name, or is where it must have."""
     known, types = thought.known, all_interchangeable(mention.types)
@@ -63,11 +41,17 @@ def has_done(thought: Thought, verb: str, mention: Mention) -> bool:
     if verb == verbs.NAVIGATE and known.at in types:
         return True
     if verb == verbs.NAVIGATE and known.at in OBJECT_TYPES:
-        return any(each.on in types for _, each in thought.things([known.at])) or thought.done(
-            verb, types
+        return (
+            any(each.on in types for _, each in thought.things([known.at]))
+            or thought.done(verb, types)
+            or _was_near(thought, types)
         )
     if verb in (verbs.OPEN, verbs.CLOSE) and thought.done(verbs.TOGGLE, types):
         return True
+    if verb == verbs.TOGGLE and (
+        thought.done(verbs.OPEN, types) or thought.done(verbs.CLOSE, types)
+    ):
+        return True  # Chinese says open and close of both
     if verb != "searched":
         return thought.done(verb, types)
     if known.at in types or any(
@@ -78,6 +62,23 @@ def has_done(thought: Thought, verb: str, mention: Mention) -> bool:
     # What cannot be opened is searched by looking at it from near by.
     opens = any("openable" in OBJECT_TYPES[each].properties for each in mention.types)
     return not opens and any(place for each in types for place in (known.seen.get(each),))
+
+
+_FRONTS = ("Drawer", "Shelf")
+"""Who goes to these goes to what they are in."""
+
+
+def _was_near(thought: Thought, types: frozenset[str]) -> bool:
+    """Whether the agent went to something that lay on one of some types, or is part of it."""
+    gone = {
+        each.action.object_type
+        for each in thought.known.actions
+        if each.success and each.action.verb == verbs.NAVIGATE
+    }
+    return any(
+        thought.known.where(each) in types or (each in _FRONTS and PARTS[each] & types)
+        for each in gone
+    )
 
 
 def check_outcome(thought: Thought) -> Iterator[Refusal]:

@@ -53,7 +53,7 @@ def check_unseen(thought: Thought) -> Iterator[Refusal]:
             for match in phrase.finditer(clause.text):
                 if _wanted_before(clause, match, phrases) or clause.intended:
                     continue
-                for mention in _subjects(clause, match, phrases):
+                for mention in subjects(clause, match, phrases):
                     if mention in strange:
                         yield _not_seen(mention)
 
@@ -67,7 +67,7 @@ def check_hidden(thought: Thought) -> Iterator[Refusal]:
         if not clause.intended:
             for phrase in phrases.located:
                 for match in phrase.finditer(clause.text):
-                    for mention in _subjects(clause, match, phrases):
+                    for mention in subjects(clause, match, phrases):
                         if not mention.types & thought.seen and not is_given(thought, mention):
                             yield _nowhere(mention)
         for match in _matches(clause, (*phrases.on, *phrases.out_of)):
@@ -76,7 +76,7 @@ def check_hidden(thought: Thought) -> Iterator[Refusal]:
             ):
                 continue
             (holder,) = clause.named(match, "y")
-            for mention in _subjects(clause, match, phrases):
+            for mention in subjects(clause, match, phrases):
                 if mention.types & thought.seen or is_given(thought, mention):
                     continue
                 yield Refusal(
@@ -88,7 +88,7 @@ def check_hidden(thought: Thought) -> Iterator[Refusal]:
 
 def check_inside(thought: Thought) -> Iterator[Refusal]:
     """States what is in a closed container that the agent has not opened."""
-    for mention, holder in _told_to_be_on(thought):
+    for _, mention, holder in told_to_be_on(thought):
         if not _is_shut(thought, holder) or not mention.types & thought.seen:
             continue
         if not any(each.on in holder.types for _, each in thought.things(mention.types)):
@@ -99,17 +99,7 @@ def check_inside(thought: Thought) -> Iterator[Refusal]:
             )
 
 
-def check_support(thought: Thought) -> Iterator[Refusal]:
-    """Says that an object in view lies in or on another object than it does."""
-    for mention, holder in _told_to_be_on(thought):
-        wrong = not_on(thought, mention, holder)
-        if wrong:
-            yield Refusal(
-                "support", f"{name_of(mention)} is not in or on {name_of(holder)}: {wrong}."
-            )
-
-
-def _told_to_be_on(thought: Thought) -> Iterator[tuple[Mention, Mention]]:
+def told_to_be_on(thought: Thought) -> Iterator[tuple[Clause, Mention, Mention]]:
     """What is told as a fact to be in or on something now, with that."""
     phrases = thought.phrases
     for clause in thought.clauses:
@@ -118,8 +108,8 @@ def _told_to_be_on(thought: Thought) -> Iterator[tuple[Mention, Mention]]:
         for match in _matches(clause, phrases.on):
             if not is_placing(clause, match.start("xs"), phrases):
                 (holder,) = clause.named(match, "y")
-                for mention in _subjects(clause, match, phrases):
-                    yield mention, holder
+                for mention in subjects(clause, match, phrases):
+                    yield clause, mention, holder
 
 
 def check_side(thought: Thought) -> Iterator[Refusal]:
@@ -137,12 +127,19 @@ def check_side(thought: Thought) -> Iterator[Refusal]:
                 fits = (
                     not places
                     or direction in places
+                    or (mention.types & _WIDE and "ahead" in (*places, direction))
                     or (nearly and "ahead" in places)
                     or _bears_there(thought, mention, clause, direction)
                 )
                 wrong.append("" if fits else f"{name_of(mention)} is {_directions(places)}")
             if wrong and all(wrong):
                 yield Refusal("side", f"{wrong[0]}, not {_directions({direction})}.")
+
+
+_WIDE = frozenset(
+    {"CounterTop", "DiningTable", "Bed", "Bathtub", "BathtubBasin", "Sofa", "ShelvingUnit", "Desk"}
+)
+"""What is so wide that its centre may be ahead and the most of it on one side."""
 
 
 def _bears_there(thought: Thought, mention: Mention, clause: Clause, direction: str) -> bool:
@@ -158,51 +155,6 @@ def _bears_there(thought: Thought, mention: Mention, clause: Clause, direction: 
     )
 
 
-# -- states and the hand ---------------------------------------------------------------------------
-
-
-def check_state(thought: Thought) -> Iterator[Refusal]:
-    """Says that something in view is open, closed, on or off, and it is not."""
-    phrases = thought.phrases
-    for clause in thought.clauses:
-        if clause.guessed or clause.past:
-            continue
-        claims: list[tuple[Mention, re.Match[str]]] = [
-            (clause.named(match, "x")[0], match) for match in _matches(clause, phrases.states)
-        ]
-        of_it = phrases.it_states.search(clause.text) if clause.it else None
-        if clause.it and of_it:
-            claims.append((clause.it, of_it))
-        for mention, match in claims:
-            said = match.groupdict()
-            word = next((word for word in STATES if said.get(word)), "on")
-            wrong = is_not(thought, mention, word, bool(match["no"]))
-            if wrong:
-                yield Refusal("state", f"{name_of(mention)} {wrong}; say so, or leave it out.")
-
-
-def check_hand(thought: Thought) -> Iterator[Refusal]:
-    """Claims to hold an object that it does not hold, or an empty hand while it holds one."""
-    phrases, held = thought.phrases, thought.known.held
-    truth = f"the agent holds {held}" if held else "the hand is empty"
-    for clause, match in _denials(thought, phrases.not_held):
-        for mention in _subjects(clause, match, phrases):
-            if mention.types <= thought.held:
-                yield Refusal("held", f"Do not deny it: {truth}.")
-    for clause in thought.clauses:
-        if clause.guessed or clause.past:
-            continue
-        if held and not clause.intended and phrases.empty_hand.search(clause.text):
-            yield Refusal("held", f"The hand is not empty: {truth}.")
-        for match in _matches(clause, phrases.held):
-            senses = (phrases.negation, phrases.intention, phrases.goal)
-            if any(clause.says_before(sense, match.end()) for sense in senses):
-                continue
-            for mention in clause.named(match, "xs", "x"):
-                if not mention.types & thought.held:
-                    yield Refusal("held", f"{name_of(mention)} is not in the hand: {truth}.")
-
-
 # -- helpers ---------------------------------------------------------------------------------------
 
 
@@ -210,19 +162,6 @@ def _matches(clause: Clause, phrases: Iterable[re.Pattern[str]]) -> list[re.Matc
     if MARK not in clause.text:
         return []
     return [match for phrase in phrases for match in phrase.finditer(clause.text)]
-
-
-def _denials(
-    thought: Thought, phrases: Iterable[re.Pattern[str]]
-) -> Iterator[tuple[Clause, re.Match[str]]]:
-    """What is denied as a fact. "Not the mug or the apple" denies both, and guesses nothing."""
-    for clause in thought.clauses:
-        if clause.asks or clause.conditional or clause.usual or clause.past:
-            continue
-        for match in _matches(clause, phrases):
-            rest = f"{clause.text[: match.start()]} {clause.text[match.end() :]}"
-            if not thought.phrases.hedge.search(rest):
-                yield clause, match
 
 
 def _wanted_before(clause: Clause, match: re.Match[str], phrases: Phrases) -> bool:
@@ -234,7 +173,7 @@ def _wanted_before(clause: Clause, match: re.Match[str], phrases: Phrases) -> bo
     )
 
 
-def _subjects(clause: Clause, match: re.Match[str], phrases: Phrases) -> list[Mention]:
+def subjects(clause: Clause, match: re.Match[str], phrases: Phrases) -> list[Mention]:
     """The names that a match is about; "at the sink, the mug is ..." is about the mug alone."""
     found = clause.named(match, "xs")
     if phrases.of_other.search(clause.text[: match.start("xs")]):
@@ -324,34 +263,6 @@ def not_on(thought: Thought, mention: Mention, holder: Mention) -> str:
     return " or ".join(sorted(where))
 
 
-def is_not(thought: Thought, mention: Mention, word: str, negated: bool) -> str:
-    """What is so, if nothing of that name in view is in that state; else ``""``."""
-    wanted, attributes = STATES[word]
-    wanted = wanted != negated
-    there = [each for _, each in thought.things(mention.types)]
-    states = [
-        [getattr(each, name) for name in attributes if getattr(each, name) is not None]
-        for each in there
-    ]
-    if not states or any(not one or wanted in one for one in states):
-        return ""
-    is_open = there[0].open is not None and "open" in attributes
-    words = ("closed", "open") if is_open else ("switched off", "switched on")
-    return f"is {words[not wanted]}"
-
-
-STATES: Mapping[str, tuple[bool, tuple[str, ...]]] = {
-    "open": (True, ("open",)),
-    "closed": (False, ("open",)),
-    "on": (True, ("toggled",)),
-    "off": (False, ("toggled",)),
-    "loose_open": (True, ("open", "toggled")),
-    "loose_closed": (False, ("open", "toggled")),
-}
-"""A word for a state, by its group in the phrases: whether it is so, and the attributes of
-:class:`~er_gym.data.trajectory.SeenObject` that it is about. Chinese says open of what is on."""
-
-
 def _directions(places: Iterable[str]) -> str:
     words = {"left": "on the left", "right": "on the right", "behind": "behind the agent"}
     return " or ".join(sorted(words.get(place, "straight ahead") for place in places))
@@ -385,7 +296,8 @@ def _sides(clause: Clause, phrases: Phrases) -> Iterator[tuple[str, bool, list[M
                     for place, mention in nearest
                     if not phrases.of_other.search(clause.text[begin:place])
                 ]
-                yield direction, nearly, [nearest[-1][1], *own[-1:]]
+                if own:  # else something without a name is there
+                    yield direction, nearly, [nearest[-1][1], *own[-1:]]
 
 
 def _pairs(clause: Clause, start: int, end: int) -> Iterator[tuple[int, Mention]]:

@@ -22,6 +22,8 @@ _MARKUP = re.compile(
 _HEADING = re.compile(
     r"^\s{0,3}#{1,6}\s|```|^[^\S\n]*(?:---|===)[^\S\n]*$|^[^\S\n]*[{\[]\s*[\"{]", re.MULTILINE
 )
+_ANSWERED = re.compile(r"提示(?:说|告诉)")
+"""After a failed action, it speaks of the answer to it rather than of the hint."""
 _PLAIN = re.compile(r"[\W_]+")
 _MOST_LATIN = 2
 """So many words of Latin letters may stand in a Chinese thought beside object types: OK, TV ..."""
@@ -86,7 +88,15 @@ def check_tags(thought: Thought) -> Iterator[Refusal]:
 
 def check_leak(thought: Thought) -> Iterator[Refusal]:
     """Mentions the prompt, the data or itself as a model, or contains an error's text."""
-    found = thought.phrases.leak.search(thought.text.lower().replace("’", "'"))
+    refused = any(not each.success for each in thought.known.actions)
+    found = next(
+        (
+            each
+            for each in thought.phrases.leak.finditer(thought.text.lower().replace("’", "'"))
+            if not (refused and _ANSWERED.match(each.group()))
+        ),
+        None,
+    )
     if found:
         yield Refusal(
             "leak",

@@ -29,6 +29,10 @@ class Phrases:
         hedge, negation, condition, goal, custom, past, intention: marks of clauses that claim
             something else than what is so now: what may be, what is not, what would be, what is
             wanted, what is usual, what was, what the agent is going to do.
+        supposition: a condition that covers the rest of its sentence, up to a contrast.
+        coming: a sentence that tells what will be.
+        contrast, contrast_after: at the beginning or the end of a clause: from there on it is told
+            again what is so.
         seen: claims to see ``xs``.
         located: claims that ``xs`` are somewhere.
         on: claims that ``xs`` lie in or on ``y``.
@@ -43,7 +47,6 @@ class Phrases:
         it_states: the same of "it".
         held, not_held: claims to hold ``xs``, or to hold none of them.
         empty_hand: claims that the hand is empty.
-        did: claims to have done something to ``x``, by verb; ``searched`` is one.
         failed, succeeded: claims that the last action did so.
         failing: an action that failed is spoken of.
         decides: the beginning of a decision; one of ``acts`` follows.
@@ -67,6 +70,10 @@ class Phrases:
     custom: Phrase
     past: Phrase
     intention: Phrase
+    supposition: Phrase
+    coming: Phrase
+    contrast: Phrase
+    contrast_after: Phrase
     seen: Sequence[Phrase]
     located: Sequence[Phrase]
     on: Sequence[Phrase]
@@ -81,7 +88,6 @@ class Phrases:
     held: Sequence[Phrase]
     not_held: Sequence[Phrase]
     empty_hand: Phrase
-    did: Mapping[str, Sequence[Phrase]]
     failed: Phrase
     succeeded: Phrase
     failing: Phrase

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 
 from er_gym.data.phrases import MARK, Phrase, Phrases
-from er_gym.tasks import verbs
 
 
 def _any(*phrases: str) -> Phrase:
@@ -98,7 +97,7 @@ PHRASES = Phrases(
             "/expect/expected/imagine/wonder/wondering/hoped/had hoped/(?<!a )(?<!no )thought/can picture/i picture/picturing/chance/chances/hope/hoping/hopefully/bet"
             "/should be/must be/must have/should have/ought to/seems/seem/appears to be/as if/as though"
             "/supposedly/apparently/unclear/unsure/not sure/uncertain/cannot tell/can't tell"
-            "/would/i think/i believe/i'd(?! (?:[a-z]+ed|gone|been|taken|seen|put|shut|left|had|got|come|found|already|just|even)\b)/or/either/no idea/unless"
+            "/(?:could|would|might|should|need|must)(?:n't| not)? have/would/i think/i believe/i'd(?! (?:[a-z]+ed|gone|been|taken|seen|put|shut|left|had|got|come|found|already|just|even)\b)/or/either/no idea/unless"
             "/whether/reckon/apt/doubt/odds/likelihood/looks like/look like/resembles"
         ),
     ),
@@ -134,6 +133,16 @@ PHRASES = Phrases(
         r"|want to|had better|i'd better|time to|heading|consider|option|options|could|ready to|try|bring|carry"
         r"|(?:am|'m) (?:taking|bringing|carrying .* to))\b|'ll\b|^to (?!(?:one|my|the|either)\b)|^by (?!(?:my|the)\b)"
     ),
+    supposition=_any(
+        r"\b(?:if(?! (?:i (?:remember|recall)|memory|i'm not mistaken)\b)|unless|in case|suppos(?:e|ing)|assuming|provided|imagine|as though|i wish)\b",
+        rf"^(?:and |but |so |well |then )*(?:had|were|should) (?:i|we|it|they|there|anyone|somebody|someone|this|that|(?:the|a|an|my|any|one) (?:[a-z-]+ ){{0,2}}{MARK}|the|my)\b",
+    ),
+    coming=re.compile(
+        rf"\b(?:after|once|when|as soon as|by the time) (?:i have|i've|i am|i'm|it's|it is|it has|that's|that is|(?:the|my|both|all) [^,]{{0,20}}{MARK} (?:is|are|has|have)\b)[^.]*(?:\bwill\b|'ll\b|\bcan\b|\bgoing to\b)"
+        rf"|(?:\bwill\b|'ll\b|\bcan\b)[^.]*\b(?:after|once|when|as soon as) (?:i have|i've|i am|i'm|(?:the|my|both|all) [^,]{{0,20}}{MARK} (?:is|are|has|have)\b)"
+    ),
+    contrast=re.compile(r"^(?:but|yet|still|however|as it is|as it happens|luckily|fortunately|alas|unfortunately)\b"),
+    contrast_after=re.compile(r"(?:\bbut|\byet|\bhowever)$"),
     seen=(
         re.compile(
             r"\b(?:see|sees|seeing|saw|spot|spotted|spots|notice|noticed|observe|observed|make out|catch sight of|caught sight of"
@@ -199,7 +208,7 @@ PHRASES = Phrases(
     },
     nearly=re.compile(r"(?:slightly|a (?:little|bit|touch|fraction)|just|somewhat)(?: off| over)? $"),
     of_other=re.compile(
-        r"\b(?:next to|besides|beside|near|by|of|on|in|above|under|below|underneath|over|behind|(?<!looking )at|inside|with|against|between|beyond|past|than|from|to|towards|along)"
+        r"\b(?:next to|besides|beside|near|by|of|for|on|in|above|under|below|underneath|over|behind|(?<!looking )at|inside|with|against|between|beyond|past|than|from|to|towards|along)"
         rf" {_D}(?:{MARK} and {_D})?$"
     ),
     is_so=re.compile(r",? (?:is|are|stands?|sits?|lies|lie|rests?|hangs?|there (?:is|are)|there's|i (?:can |could )?(?:also )?(?:see|notice|spot|find|make out|have))\b"),
@@ -240,42 +249,6 @@ PHRASES = Phrases(
         r"|(?:\bnot|n't)(?: currently| yet)? have anything in (?:my|either) hands?|\bempty[- ]handed\b|\bnothing (?:is )?(?:yet )?in (?:my|the|either) hands?\b|(?:\bnot|n't)(?: currently| yet)? (?:holding|carrying|hold|carry) anything\b"
         r"|\b(?:hold|holding|carry|carrying) nothing\b|\bwith (?:an empty|a free|empty|free) hands?\b"
     ),
-    did={
-        verbs.OPEN: (
-            re.compile(rf"{_PAST}(?:opened(?: up)?|pulled open) {_D}{_X}"),
-            re.compile(rf"{_X} (?:has|have)(?: already| just)* been opened\b(?! by)"),
-        ),
-        verbs.CLOSE: (
-            re.compile(rf"{_PAST}closed {_D}{_X}"),
-            re.compile(rf"\bi(?:'ve| have)(?: \w+)? shut {_D}{_X}"),
-        ),
-        verbs.PICKUP: (
-            re.compile(rf"{_PAST}(?:picked up|taken|took|grabbed|collected|fetched|retrieved|lifted) {_D}{_X}(?! into account| in)"),
-            re.compile(rf"{_PAST}(?:picked|taken) {_D}{_X} up\b"),
-        ),
-        verbs.PUT: (
-            re.compile(
-                rf"(?:{_PAST}(?:placed|dropped|stored|laid|deposited)|\bi(?:'ve| have)(?: already| just| now)* (?:put|set|left)) (?:it|them|{_D}{_X})(?: down| away| safely)? (?:in|into|on|onto|inside|on top of) {_D}{_Y}"
-            ),
-        ),
-        verbs.TOGGLE: (
-            re.compile(rf"{_PAST}(?:switched|turned|toggled|powered)(?: on| off)? {_D}{_X}(?: on| off)?(?! over| around)"),
-        ),
-        verbs.NAVIGATE: (
-            re.compile(
-                rf"{_PAST}(?:visited|reached|(?:gone|went|been|walked|walked over|gone over|went over|arrived|got|come|came|moved|navigated|returned|made it)(?: back)? (?:to|at)) {_D}{_X}"
-            ),
-            re.compile(rf"{_X} (?:has|have)(?: already)* been visited\b"),
-        ),
-        "searched": (
-            re.compile(rf"{_PAST}(?:{_SEARCHED}) {_D}{_X}"),
-            re.compile(rf"{_X},? which {_I}(?:{_SEARCHED})"),
-            re.compile(rf"\bmy (?:search|inspection|check|visit) (?:of|to) {_D}{_X}"),
-            re.compile(rf"{_X} turned out to be empty"),
-            re.compile(rf"{_X} (?:has|have|was|is)(?: already| now)* (?:been )?(?:already )?(?:searched|checked|examined|inspected|explored|investigated)\b"),
-            re.compile(rf"\bafter (?:searching|checking|opening|visiting|examining|exploring|looking (?:in|into|inside)) {_D}{_X}(?= without| in vain| and finding| and seeing| to no)"),
-        ),
-    },
     failed=_any(
         r"\b(?:last|previous|preceding) (?:action|attempt|step|move|try)[^.,]{0,40}?(?:failed|fail|unsuccessful|(?:did not|didn't|has not|hasn't) (?:succeed|work|go)|had no effect|was not|wasn't)",
         r"\b(?:failed|unable|not able|wasn't able) to (?:open|close|pick|take|grab|put|place|reach|get to|switch|turn|toggle|navigate|go|walk|head|move|shut|pull|slice|look around|step|observe|do (?:it|that|this|so))\b",
@@ -337,11 +310,11 @@ PHRASES = Phrases(
         r"|\bi(?:'m| am| have)(?: all| now)? (?:done|finished)(?= *(?:$|[.,!]|with (?:the|my|this) task|here))|\bnothing (?:more|else|left|further)(?: is left| remains)? (?:for me )?to (?:do|be done)\b"
     ),
     leak=_any(
-        r"\bhints?\b|\bkey actions?\b|\bground[- ]truth\b|\bdata ?sets?\b|\blanguage model\b|\ban ai\b|\bai (?:assistant|model)\b|\bas an? (?:large |ai|assistant|model)",
+        r"\b(?:the|this|that|your|given|provided|following) hints?\b(?! of\b)|\bhints? (?:says?|tells?|states?|mentions?|suggests?|given|provided|reads?)\b|\bkey actions?\b|\bground[- ]truth\b|\bdata ?sets?\b|\blanguage model\b|\ban ai\b|\bai (?:assistant|model)\b|\bas an? (?:large |ai|assistant|model)",
         r"\b(?:as|i was|i am|i've been|have been) (?:instructed|told|asked) to (?:justify|explain|write|give|provide|produce|respond|think of)\b|\bas instructed,|\bjustify (?:the|my|this) (?:decision|action|choice)",
         r"\b(?:provided|given|supplied|predetermined|intended|predefined|prescribed|expected) (?:decision|action|answer|list|plan|sequence|next (?:step|action))\b|\b(?:decision|action|list|answer|sequence)[^.]{0,30}(?:was|were|has been|have been|am|is) given (?:to me|here)\b|\blist[^.]{0,40}\bgiven\b",
-        r"\b(?:candidate|given|pending|navigable|provided|supplied|location) list\b|\b(?:on|in|from|per|following) the list\b|\bthe list (?:says|of|that|tells|given|shows|contains)|\bmetadata\b|\bsimulator\b|\bsystem prompt\b|\bthe prompt\b|\bword limit\b|\btraining data\b|\bannotat(?:ion|ed|or)",
-        r"\bi(?:'m| am) sorry,? (?:but )?i (?:can't|cannot|can not|am unable|won't)|\bi (?:cannot|can't|am unable to) (?:assist|help|comply|fulfill|provide|process|view (?:the )?images)|\bcan(?:'t|not) (?:assist|help) with",
+        r"\b(?:candidate|given|pending|navigable|provided|supplied|location) list\b|(?<!next )(?<!first )(?<!last )(?<!high )\b(?:on|in|from|per|following) the list\b|\bthe list (?:says|of|that|tells|given|shows|contains)|\bmetadata\b|\bsimulator\b|\bsystem prompt\b|\bthe prompt\b|\bword limit\b|\btraining data\b|\bannotat(?:ion|ed|or)",
+        r"\bi(?:'m| am) sorry,? (?:but )?i (?:can't|cannot|can not|am unable|won't)|\bi (?:cannot|can't|am unable to) (?:assist|help(?! (?:but\b|[a-z]+ing\b))|comply|fulfill|provide|process|view (?:the )?images)|\bcan(?:'t|not) (?:assist|help) with",
         r"\b(?:http|error|status)(?: code)?:? ?[45]\d\d\b|\b[45]\d\d (?:internal|bad|too many|service|gateway|forbidden|unauthori|not found|error)|\brate limit|\btoo many requests\b|\binternal server error\b|\btime(?:d)? ?out error\b|\btraceback\b|\bapi key\b|\bexception\b:|\bopenai\b|\bgpt-?\d|\brequest failed\b|\bconnection (?:error|refused|reset)|\binsufficient[_ ]quota|\bcontent policy\b",
     ),
     labels=re.compile(

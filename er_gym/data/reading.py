@@ -86,10 +86,14 @@ def read(text: str, language: Language) -> tuple[Clause, ...]:
         sentence = phrases.aside.sub("", sentence)
         asks = bool(phrases.question.search(sentence))
         before: tuple[Mention, ...] = ()
+        supposed = coming = bool(phrases.coming.search(sentence))
         for part in _clauses(sentence, phrases):
             count = part.count(MARK)
             mine, queue = tuple(queue[:count]), queue[count:]
             body = part.strip()
+            if phrases.contrast.search(body):
+                supposed = coming
+            supposed = supposed or bool(phrases.supposition.search(body))
             found.append(
                 Clause(
                     text=body,
@@ -99,7 +103,7 @@ def read(text: str, language: Language) -> tuple[Clause, ...]:
                     asks=asks,
                     hedged=bool(phrases.hedge.search(body)),
                     negated=bool(phrases.negation.search(body)),
-                    conditional=bool(phrases.condition.search(body)),
+                    conditional=supposed or bool(phrases.condition.search(body)),
                     wanted=bool(phrases.goal.search(body)),
                     usual=bool(phrases.custom.search(body)),
                     past=bool(phrases.past.search(body)),
@@ -109,6 +113,8 @@ def read(text: str, language: Language) -> tuple[Clause, ...]:
                 )
             )
             before = (*before, *mine)
+            if phrases.contrast_after.search(body):
+                supposed = coming
     return tuple(found)
 
 

@@ -45,6 +45,8 @@ def check_remembered(thought: Thought) -> Iterator[Refusal]:
     known = thought.known
     if known.purpose in _OTHERWISE or not _remembers(known):
         return
+    if any(_RECALLS[known.language].search(each.text) for each in thought.clauses):
+        return  # it says so itself
     names = all_interchangeable([known.sought])
     for clause in thought.clauses:
         about = any(each.types & names for each in clause.mentions)
@@ -68,6 +70,17 @@ def _guesses(clause: Clause, language: Language) -> bool:
     return bool(place and _MAY_BE[language].search(clause.text))
 
 
+_RECALLS: Mapping[Language, re.Pattern[str]] = {
+    "en": re.compile(
+        r"\bi(?:'ve| have|'d| had|'m sure i| do| did)?(?: (?:already|just|also|first|clearly))* "
+        r"(?:saw|seen|noticed|spotted|remember|recall|caught sight of|glimpsed)\b"
+        r"(?! (?:no|nothing)\b)"
+    ),
+    "zh": re.compile(
+        r"(?<!没)(?<!没有)(?<!未)(?<!能)(?:见过|看见过|看到过|瞥见|瞧见过|记得|看到的|看见的|见到的|看到了|看见了)"
+    ),
+}
+"""Words of one who remembers."""
 _MAY_BE: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(
         r"\b(?:(?:may|might|could|must)(?: well| still| also| just)* "

@@ -17,7 +17,7 @@ _AT = re.compile(
     r",\s+(?=(?:neither|none|nor|which|hardly|plain|and no|and nothing|not|no|that|where|who|i|i'm"
     r"|i've|i'll|so|but|though|with|there|it|it's|yet|because|since|as|let|let's|nothing|having|then"
     r"|and i|and then|and now|and that|and so|and there|and it|now|only to|hence|one)\b)"
-    r"|\s+but\s+(?=i\b|no\b|not\b|it\b|there\b)"
+    r"|\s+but\s+(?=i\b|no\b|not\b|it\b|there\b)|\s+and\s+(?=neither\b|none\b|nothing\b|never\b|not\b)"
 )
 """What follows is no item of a list."""
 

@@ -49,7 +49,11 @@ def judge_deeds(thought: Thought) -> Iterator[Verdict]:
                 ):
                     continue
                 begin = max(0, match.start() - _BEFORE)
+                if lexicon.unwilling.search(clause.text, begin, match.end()):
+                    continue
                 denied = lexicon.undone.search(clause.text, begin, match.end())
+                if denied and lexicon.once_more.search(clause.text, begin):
+                    continue
                 yield from _deed(thought, clause.sentence, verb, mention, bool(denied), match)
                 if not denied and not clause.negated and lexicon.first_try.search(clause.text):
                     yield from _first_try(thought, clause.sentence, verb, mention)
@@ -59,7 +63,16 @@ def judge_deeds(thought: Thought) -> Iterator[Verdict]:
                 if mention is not None:
                     yield from _deed(thought, clause.sentence, verb, mention, True, match)
         for verb, phrase in lexicon.nothing.items():
-            if phrase.search(clause.text):
+            none = phrase.search(clause.text)
+            before = any(
+                each.mentions
+                for each in thought.clauses
+                if each.sentence == clause.sentence and each is not clause
+            )
+            if none and not (
+                lexicon.none_here.match(clause.text, none.end())
+                or ((clause.mentions or before) and lexicon.none_of_them.search(none.group()))
+            ):
                 done = [each for each in thought.known.actions if _counts(each, verb)]
                 yield Verdict(
                     clause.sentence,

@@ -39,9 +39,8 @@ def unknown_sentences(thought: Thought) -> tuple[int, int]:
     phrases = thought.phrases
     read = {verdict.sentence for judge in JUDGES for verdict in judge(thought)}
     others = (
-        *(*phrases.seen, *phrases.located, *phrases.on, *phrases.states, *phrases.held),
-        *(*phrases.not_held, phrases.empty_hand, phrases.failed, phrases.succeeded, phrases.over),
-        *(*phrases.sides.values(), *(each for those in phrases.did.values() for each in those)),
+        *(*phrases.seen, *phrases.located, *phrases.on),
+        *(phrases.failed, phrases.succeeded, phrases.over, *phrases.sides.values()),
     )
     for clause in thought.clauses:
         if clause.sentence not in read and any(each.search(clause.text) for each in others):

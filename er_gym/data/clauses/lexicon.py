@@ -23,7 +23,11 @@ class Lexicon:
         denied_deeds: what the agent has not done, by verb, with its object ``x``.
         first_try: a deed succeeded at once.
         undone: before or in a deed: it was not done.
+        unwilling: before or in a deed: it was not wanted, or only tried.
+        once_more: a deed is denied in one direction or for a second time.
         nothing: what denies deeds of a kind altogether, by verb.
+        none_here: after that: it is denied of some place or time.
+        none_of_them: in that: it may be denied of what was named before.
         plain_verbs: the words for a verb in any form, by verb.
         failing: a deed that failed.
         order: says that one deed, group ``a``, came before another, group ``b``.
@@ -36,6 +40,9 @@ class Lexicon:
         room_in_general: a room is named, but not as this one.
         states: ``x`` is in a state, with the groups of
             :attr:`er_gym.data.phrases.Phrases.states`.
+        none_of: before ``x``: none of them.
+        state_since: after a state: it is another one since.
+        at_times: what is told is told of another time.
         poured: water runs from ``x``.
         held: ``x`` is in the hand.
         lies_on: ``x`` is on or in ``y``.
@@ -69,7 +76,11 @@ class Lexicon:
     denied_deeds: Mapping[str, Sequence[Words]]
     first_try: Words
     undone: Words
+    unwilling: Words
+    once_more: Words
     nothing: Mapping[str, Words]
+    none_here: Words
+    none_of_them: Words
     plain_verbs: Mapping[str, Words]
     failing: Words
     order: Sequence[Words]
@@ -81,6 +92,9 @@ class Lexicon:
     rooms: Mapping[str, Words]
     room_in_general: Words
     states: Sequence[Words]
+    none_of: Words
+    state_since: Words
+    at_times: Words
     poured: Words
     held: Sequence[Words]
     lies_on: Sequence[Words]

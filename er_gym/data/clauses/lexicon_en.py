@@ -117,12 +117,16 @@ LEXICON = Lexicon(
         )
     },
     first_try=re.compile(r"\b(?:at|on|with) (?:the|my) (?:very )?first (?:try|attempt|go|grab|shot)|\bfirst time round|\bfirst (?:try|attempt|grab) (?:worked|succeeded|went)|\b(?:straight off|in one go|at once|without a hitch)\b"),
-    undone=re.compile(r"\b(?:never|not|nothing|without|neither|nor|none|no|cannot|yet to|rather than|instead of|failed|unable|tried to|meant to|wanted to)\b|n't\b"),
+    undone=re.compile(r"\b(?:never|not|nothing|without|neither|nor|none|no|yet to|failed|unable)\b|n't\b"),
+    unwilling=re.compile(r"\b(?:cannot|can't|rather than|instead of|tried to|meant to|wanted to|needn't|about to)\b"),
+    once_more=re.compile(r"\b(?:back|again|off|twice|a second time|properly|fully|quite|thoroughly|either of)\b"),
     nothing={
         verbs.OPEN: re.compile(r"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|even|actually|ever|so far))* (?:opened?) (?:a (?:single )?thing|anything|any (?:of (?:the|these) )?(?:container|door|thing)s?|one thing)\b|\bopened (?:nothing|not a thing)\b|\bnothing(?: at all)? (?:has been|was|is) opened\b|\bwithout (?:ever |once )?opening anything\b"),
         verbs.PICKUP: re.compile(r"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|even|actually|ever|so far))* (?:picked up|taken|touched|pick up|take|grabbed) (?:a (?:single )?thing|anything|any (?:item|object)s?)\b|\b(?:picked up|taken|grabbed) (?:nothing|not a thing)\b|\bpicked nothing up\b|\bnothing(?: at all)? (?:has been|was) (?:picked up|taken)\b"),
         verbs.NAVIGATE: re.compile(r"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|even|actually|ever|so far))* (?:moved|gone anywhere|left (?:the )?(?:start|spot|my spot|where i (?:started|began))|budged|taken a (?:single )?step|gone to (?:any|a single) (?:place|thing))\b|\bnot moved (?:an inch|at all)\b"),
     },
+    none_here=re.compile(r" (?:in|on|here|there|else|inside|near|at(?! all)|with|since|from|other|but|except|that)\b"),
+    none_of_them=re.compile(r"\bany of\b"),
     plain_verbs={
         verbs.OPEN: re.compile(r"\b(?:open(?:ed|ing)?|pull(?:ed|ing)|lift(?:ed|ing)?|raising)\b"),
         verbs.CLOSE: re.compile(r"\b(?:clos(?:e|ed|ing)|shut(?:ting)?|lower(?:ed|ing)?)\b"),
@@ -177,6 +181,9 @@ LEXICON = Lexicon(
         re.compile(rf"{_X}(?: doors?| lid| light)?(?: (?:(?:over )?(?:on|to|off to) (?:my|the) (?:left|right|side)|ahead|in front of me|here|there|itself|nearby))?(?: (?:is|are|hangs?|stands?|stays?|remains?|sits?)|'s|,? with its doors?)(?P<no>n't| not| no longer)?(?: (?:still|already|now|just|also|quite|both|all|currently|clearly|hanging|standing|lying|drawn|pulled|pushed|switched|turned|left|wide|fully|properly|tightly|firmly|brightly|swung|merrily|flung|half|left))* (?:(?P<open>open|ajar|agape|gaping|unlatched)|(?P<closed>shut|closed|sealed|drawn(?= |$|[,.;])(?! back| up| open))|(?P<on>on(?=$|[,.;]| and\b| but\b| again)|lit|burning|running|glowing|blazing|humming|alight|gushing|flowing|dripping|shining|whirring|boiling|brewing|playing)|(?P<off>off(?=$|[,.;]| and\b| but\b| again| now)|out(?=$|[,.;]| and\b)|dark|unlit))\b(?! by\b| up\b|-| to\b| in\b| out of\b)"),
         re.compile(rf"\b(?:with|and) (?:the|its) {_X}(?: doors?| lid)? (?:still |already |now |standing |hanging |wide )*(?:(?P<open>open|ajar|gaping|agape)|(?P<closed>shut|closed)|(?P<on>lit|running|burning|glowing)|(?P<off>unlit))(?=$|[,.;])(?P<no>(?!))?"),
     ),
+    none_of=re.compile(r"\b(?:no|none of (?:the|these|those|my|them)|neither(?: of)?(?: the| these| those| my)?|not one of (?:the|these|those))(?: [a-z-]+)? $"),
+    state_since=re.compile(r",? (?:and|but) (?:then |now |later )*(?:shut|closed|opened|switched|turned|open|off|out)(?: (?:again|up|off|on|now))*\b|,? (?:when|until|before|as long as)\b"),
+    at_times=re.compile(r"\b(?:when|whenever|while|until|before|as long as|by the time|to (?:have|hold|be holding|carry))\b"),
     poured=re.compile(rf"\bwater(?: is| was|'s)?(?: (?:already|still|now|just|happily|merrily|even))* (?:runs?|running|gush(?:es|ing)|flow(?:s|ing)|pour(?:s|ing)|drip(?:s|ping)|splash(?:es|ing)|stream(?:s|ing)|trickl(?:es|ing)|comes|coming)\b[^,.;]{{0,40}}?(?:from|out of|at) {_D}{_X}"),
     held=(
         re.compile(rf"{_X}(?:,? (?:is|are)|'s)?(?: (?:now|still|already|firmly|safely|securely|sitting|resting|lying|nestled|snug|snugly|clutched|tucked|held|tight|gripped|right|here|there|clasped))* (?:in|within|between|under) my (?:(?:left|right|own|other) )?(?:hands?|palms?|grip|grasp|gripper|fingers|fist|arms?|possession|clutches)\b"),

@@ -2,69 +2,128 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
-from er_gym.data.claims import STATES, is_not, is_placing, not_on
-from er_gym.data.clauses.reading import Verdict, clauses_of, is_told, lexicon_of
+from er_gym.data.claims import is_placing, not_on, subjects, told_to_be_on
+from er_gym.data.clauses.reading import Span, Verdict, clauses_of, is_told, lexicon_of
+from er_gym.data.mentions import Mention
 from er_gym.data.thought import Refusal, Thought, name_of
+
+STATES: Mapping[str, tuple[bool, tuple[str, ...]]] = {
+    "open": (True, ("open",)),
+    "closed": (False, ("open",)),
+    "on": (True, ("toggled",)),
+    "off": (False, ("toggled",)),
+    "loose_open": (True, ("open", "toggled")),
+    "loose_closed": (False, ("open", "toggled")),
+}
+"""A word for a state, by its group in the phrases: whether it is so, and the attributes of
+:class:`~er_gym.data.trajectory.SeenObject` that it is about. Chinese says open of what is on."""
 
 
 def judge_states(thought: Thought) -> Iterator[Verdict]:
     """A thing is open, closed, on or off."""
-    lexicon = lexicon_of(thought)
+    lexicon, phrases = lexicon_of(thought), thought.phrases
     for clause, span in clauses_of(thought):
         if not is_told(clause) or clause.past or clause.intended:
             continue
-        for match in span.matches(lexicon.states):
-            mention = span.named(match, "x")
-            said = match.groupdict()
-            word = next((word for word in STATES if said.get(word)), "")
-            if mention is None or not word:
+        claims = [
+            (mention, match)
+            for match in span.matches((*lexicon.states, *phrases.states))
+            if (mention := span.named(match, "x"))
+        ]
+        of_it = phrases.it_states.search(clause.text) if clause.it else None
+        if clause.it and of_it:
+            claims.append((clause.it, of_it))
+        for mention, match in claims:
+            before = clause.text[: match.start()]
+            none = lexicon.none_of.search(before)
+            if not none and phrases.negation.search(before):
                 continue
-            wrong = is_not(thought, mention, word, bool(said.get("no")))
-            refusal = Refusal("state", f"{name_of(mention)} {wrong}; say so, or leave it out.")
-            yield Verdict(span.sentence, refusal if wrong else None)
+            if lexicon.state_since.match(clause.text, match.end()):
+                continue
+            said = match.groupdict()
+            word = next((word for word in STATES if said.get(word)), "on")
+            yield _state(thought, span, mention, word, bool(said.get("no")) != bool(none))
         poured = lexicon.poured.search(clause.text)
-        mention = span.named(poured, "x") if poured else None
-        if mention is not None and not clause.negated:
-            wrong = is_not(thought, mention, "on", False)
-            refusal = Refusal("state", f"{name_of(mention)} {wrong}; say so, or leave it out.")
-            yield Verdict(span.sentence, refusal if wrong else None)
+        runs_from = span.named(poured, "x") if poured else None
+        if runs_from is not None and not clause.negated:
+            yield _state(thought, span, runs_from, "on", False)
+
+
+def _state(thought: Thought, span: Span, mention: Mention, word: str, negated: bool) -> Verdict:
+    wrong = is_not(thought, mention, word, negated)
+    refusal = Refusal("state", f"{name_of(mention)} {wrong}; say so, or leave it out.")
+    return Verdict(span.sentence, refusal if wrong else None)
+
+
+def is_not(thought: Thought, mention: Mention, word: str, negated: bool) -> str:
+    """What is so, if nothing of that name in view is in that state; else ``""``."""
+    wanted, attributes = STATES[word]
+    wanted = wanted != negated
+    there = [each for _, each in thought.things(mention.types)]
+    states = [
+        [getattr(each, name) for name in attributes if getattr(each, name) is not None]
+        for each in there
+    ]
+    if not states or any(not one or wanted in one for one in states):
+        return ""
+    is_open = there[0].open is not None and "open" in attributes
+    words = ("closed", "open") if is_open else ("switched off", "switched on")
+    return f"is {words[not wanted]}"
 
 
 def judge_hand(thought: Thought) -> Iterator[Verdict]:
-    """A thing is in the hand."""
-    lexicon, held = lexicon_of(thought), thought.known.held
+    """A thing is in the hand or is not, or the hand is empty."""
+    lexicon, phrases, held = lexicon_of(thought), thought.phrases, thought.known.held
     truth = f"the agent holds {held}" if held else "the hand is empty"
     for clause, span in clauses_of(thought):
-        if not clause.is_fact or clause.past or clause.wanted:
+        if clause.guessed or clause.past:
             continue
-        for match in span.matches(lexicon.held):
-            mention = span.named(match, "x")
-            if mention is not None:
+        empty = phrases.empty_hand.search(clause.text)
+        if empty and not clause.intended and not lexicon.at_times.search(clause.text):
+            refusal = Refusal("held", f"The hand is not empty: {truth}.")
+            yield Verdict(span.sentence, refusal if held else None)
+        for match in span.matches((*lexicon.held, *phrases.held)):
+            senses = (phrases.negation, phrases.intention, phrases.goal, lexicon.at_times)
+            if any(clause.says_before(sense, match.end()) for sense in senses):
+                continue
+            for mention in clause.named(match, "xs", "x"):
                 refusal = Refusal("held", f"{name_of(mention)} is not in the hand: {truth}.")
                 yield Verdict(span.sentence, None if mention.types & thought.held else refusal)
+    # Whole clauses: "not the mug or the apple" denies both, and guesses nothing.
+    for clause in thought.clauses:
+        if clause.asks or clause.conditional or clause.usual or clause.past:
+            continue
+        for phrase in phrases.not_held:
+            for match in phrase.finditer(clause.text):
+                rest = f"{clause.text[: match.start()]} {clause.text[match.end() :]}"
+                if phrases.hedge.search(rest) or lexicon.at_times.search(rest):
+                    continue
+                for mention in subjects(clause, match, phrases):
+                    refusal = Refusal("held", f"Do not deny it: {truth}.")
+                    yield Verdict(
+                        clause.sentence, refusal if mention.types <= thought.held else None
+                    )
 
 
 def judge_supports(thought: Thought) -> Iterator[Verdict]:
     """A thing in view lies on another."""
-    lexicon = lexicon_of(thought)
+    lexicon, phrases = lexicon_of(thought), thought.phrases
+    claims = [(clause.sentence, *those) for clause, *those in told_to_be_on(thought)]
     for clause, span in clauses_of(thought):
         if not clause.is_fact or (clause.past and "was left" not in clause.text):
             continue
         for match in span.matches(lexicon.lies_on):
             mention, holder = span.named(match, "x"), span.named(match, "y")
-            if mention is None or holder is None:
-                continue
-            if is_placing(clause, match.start("x"), thought.phrases):
-                continue
-            wrong = not_on(thought, mention, holder)
-            if wrong:
-                yield Verdict(
-                    span.sentence,
-                    Refusal(
-                        "support", f"{name_of(mention)} is not in or on {name_of(holder)}: {wrong}."
-                    ),
-                )
-            elif any(True for _ in thought.things(mention.types)):
-                yield Verdict(span.sentence)
+            if mention and holder and not is_placing(clause, match.start("x"), phrases):
+                claims.append((span.sentence, mention, holder))
+    for sentence, mention, holder in claims:
+        wrong = not_on(thought, mention, holder)
+        if wrong:
+            refusal = Refusal(
+                "support", f"{name_of(mention)} is not in or on {name_of(holder)}: {wrong}."
+            )
+            yield Verdict(sentence, refusal)
+        elif any(True for _ in thought.things(mention.types)):
+            yield Verdict(sentence)
