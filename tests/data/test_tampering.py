@@ -41,7 +41,7 @@ DECIDED = {
 """Tamperings with what nothing tells but the agents, or the settings of the collection."""
 MESSAGES = {
     "every turn is learnt, faults too": "turn 0: train is False by the rule of flags, recorded was",
-    "another instruction": "instruction is 'We are going to need a Pen. Search the bedroom, and",
+    "another instruction": " in this bedroom and keep it in your hand.' by the task, recorded was",
     "a key action less": "key_actions[0].verb is 'navigate to' by the task, recorded was 'pickup'",
     "another task type": "task_type is 'single_pickup' by the task, recorded was 'pickup_and_put'",
     "another seed": "by the collection's seed and the id, recorded was",

@@ -22,6 +22,7 @@ from er_gym.data.trajectory import (
     Turn,
 )
 from er_gym.envs.actions import Action
+from er_gym.envs.feedback import told_in
 from er_gym.tasks import verbs
 
 FEEDBACK = "<|feedback|>"
@@ -57,7 +58,7 @@ def test_every_user_turn_tells_what_came_of_the_last_action(trajectories: list[T
                 failed = not before.success
                 assert text.startswith(FEEDBACK) == failed
                 if failed:
-                    assert before.feedback in text
+                    assert told_in(trajectory.language, before.feedback) in text
                 shown = 0 if failed else 3 if before.verb == verbs.OBSERVE else 1
                 assert text.count(IMAGE) == shown == len(turn.pictures)
                 seen.add((shown, trajectory.language))
