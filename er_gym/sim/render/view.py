@@ -91,18 +91,20 @@ def draw(world: World) -> View:
     return view
 
 
-def object_at(world: World, x: float, y: float) -> str | None:
-    """The id of the object at a point of the agent's picture, None for the room.
+def seen_at(world: World, x: float, y: float) -> tuple[int | None, float, Camera]:
+    """What is at a point of the agent's picture: the row of the object, None for the room; its
+    depth in metres along the view; and the camera.
 
     Args:
         x, y: 0 to 1, from the left and from the top.
     """
-    settings = world.settings
-    frames = _frames(world, next(_cameras(world)))
+    settings, camera = world.settings, next(_cameras(world))
+    frames = _frames(world, camera, depth=True)
     column = min(int(x * settings.width), settings.width - 1)
     row = min(int(y * settings.height), settings.height - 1)
     seen = int(frames.ids[row, column])
-    return world.object_ids[seen - 1] if seen else None
+    assert frames.depth is not None  # depth was requested
+    return seen - 1 if seen else None, float(frames.depth[row, column]), camera
 
 
 def _cameras(world: World) -> Iterator[Camera]:
