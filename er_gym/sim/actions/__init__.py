@@ -3,7 +3,9 @@
 from er_gym.sim.actions import (  # noqa: F401  (imported for their registrations)
     arrange_objects,
     cameras,
+    hand,
     initialize,
+    looks,
     move,
     navigation,
     no_effect,

@@ -55,7 +55,7 @@ def _array(vector: Vector) -> np.ndarray:
 def _settle(world: World, i: int, stays: bool) -> None:
     """Update the receptacles of object i. If it is in none, it falls, unless it ``stays``."""
     if i == world.held:
-        world.held = -1
+        world.let_go()
     parents = receptacles_of(world, i)
     if parents or stays:
         world.relocate(i, parents)

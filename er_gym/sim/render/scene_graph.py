@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.look import OWN, Look
 from er_gym.sim.render.appearance import Appearance, appearance_of
 from er_gym.sim.render.bake import bake_of, heading_of, look_of
 from er_gym.sim.render.camera import Camera
@@ -81,7 +82,7 @@ class SceneGraph:
 
     def __init__(self, scene_name: str, light: str = SOFT) -> None:
         self._name, self._soft, self._key = scene_name, light == SOFT, _SHOWN[light]
-        self._build(())
+        self._build((), OWN)
         self._state: object | None = object()  # the state that it shows; None while it changes
 
     def draw(
@@ -96,11 +97,11 @@ class SceneGraph:
             veils = self._veils if self._soft else None
             return rasteriser().draw(self._root, camera, depth, ids=ids, veils=veils)
 
-    def _build(self, lamps: tuple[Lamp, ...]) -> None:
-        """Build the room without its objects, in the light of some lamps."""
+    def _build(self, lamps: tuple[Lamp, ...], look: Look) -> None:
+        """Build the room without its objects, in the light of some lamps and in a look."""
         bake = bake_of(self._name)
         self._root = core().NodePath(self._name)
-        self._lamps = lamps
+        self._lamps, self._look = lamps, look
         self._placed: dict[int, _Placed] = {}
         self._shaded: dict[int, _Shaded] = {}
         # Of the world that is shown: the rows that have changed since it was recorded, and which
@@ -118,7 +119,7 @@ class SceneGraph:
         """Update everything that has changed in the world."""
         before, self._state = self._state, None
         if before is None:  # an exception left it half updated
-            self._build(self._lamps)
+            self._build(self._lamps, self._look)
         elif world.cache.state.get(self._key) is before:
             for i in world.in_hand:  # nothing but the hand has moved
                 if i in self._placed:
@@ -126,8 +127,8 @@ class SceneGraph:
             self._state = before
             return
         lamps = lamps_on(world) if self._soft else ()
-        if lamps != self._lamps:
-            self._build(lamps)
+        if lamps != self._lamps or world.look != self._look:
+            self._build(lamps, world.look)
         rows, hidden, order = self._rows(world), world.hidden, _order(world)
         recorded = bake_of(self._name).recorded
         for i in sorted(rows):
@@ -180,7 +181,7 @@ class SceneGraph:
         lit_at = place if self._soft else None
         if before is None or (before.look, before.order, before.lit_at) != (look, i, lit_at):
             lamps = self._lamps if self._soft else ()
-            node = recorded_node(self._name, look, lit_at, lamps, _number(i), kind)
+            node = recorded_node(self._name, look, lit_at, lamps, _number(i), kind, self._look)
             path = self._attach(i, node.makeCopy(), i)
         else:
             path = before.path
@@ -196,7 +197,7 @@ class SceneGraph:
         if before is None or (before.look, before.order, before.lit_at) != (look, order, lit_at):
             lamps = () if lit_at is None else self._lamps
             # A copy shares the triangles, and its place is a property of the node.
-            node = made_node(seen, heading, lit_at, lamps, _number(i)).makeCopy()
+            node = made_node(seen, heading, lit_at, lamps, _number(i), self._look).makeCopy()
             path = self._attach(i, node, order)
         else:
             path = before.path
@@ -230,7 +231,7 @@ class SceneGraph:
     def _part(self, part: str, number: int) -> Any:
         """A part of the room itself."""
         lit_at = Place() if self._soft else None
-        return room_node(self._name, part, lit_at, self._lamps, number).makeCopy()
+        return room_node(self._name, part, lit_at, self._lamps, number, self._look).makeCopy()
 
 
 def _all_same(one: tuple[object, ...], other: tuple[object, ...]) -> bool:

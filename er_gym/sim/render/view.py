@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.agent import Agent
+from er_gym.sim.look import Look
 from er_gym.sim.metadata import instance_color
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.settings import Settings, ThirdPartyCamera
@@ -55,12 +56,14 @@ class _Kept:
     settings: Settings
     cameras: tuple[ThirdPartyCamera, ...]
     map_view: bool
+    look: Look
     view: View
 
     def shows(self, world: World) -> bool:
         # A moving agent is replaced as a whole, and the held object moves only with it.
         same = self.agent is world.agent and self.settings == world.settings
-        return same and self.cameras == world.cameras and self.map_view == world.map_view
+        same = same and self.cameras == world.cameras and self.map_view == world.map_view
+        return same and self.look == world.look
 
 
 _VIEW: CacheKey[_Kept] = CacheKey("view")
@@ -86,7 +89,8 @@ def draw(world: World) -> View:
     first, *others = (_draw(world, camera) for camera in _cameras(world))
     view = replace(first, third_party=tuple(others))
     world.cache.state.put(
-        _VIEW, _Kept(world.agent, world.settings, world.cameras, world.map_view, view)
+        _VIEW,
+        _Kept(world.agent, world.settings, world.cameras, world.map_view, world.look, view),
     )
     return view
 
