@@ -35,6 +35,23 @@ OWN = Look()
 
 
 @dataclass(frozen=True)
+class Line:
+    """A line that a program has drawn into the room.
+
+    Attributes:
+        name: by which it can be taken away.
+        points: x, y and z of its points, metres, world frame.
+        width: metres.
+        posts: whether it has a post at each end.
+    """
+
+    name: str
+    points: tuple[tuple[float, float, float], ...]
+    width: float
+    posts: bool = False
+
+
+@dataclass(frozen=True)
 class Chance:
     """What ``SetRandomSeed`` seeds: it outlives the room, as in AI2-THOR.
 

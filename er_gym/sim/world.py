@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from er_gym.sim import initial_state
 from er_gym.sim.agent import Agent
 from er_gym.sim.carrying import Hand, hand_point, poses, still_held
-from er_gym.sim.look import OWN, UNSEEDED, Chance, Look
+from er_gym.sim.look import OWN, UNSEEDED, Chance, Line, Look
 from er_gym.sim.scene import Scene
 from er_gym.sim.scene_objects import PROPERTY_COLUMN, STATE_COLUMN, SceneObjects
 from er_gym.sim.settings import Settings, ThirdPartyCamera
@@ -46,7 +46,7 @@ def reversible_offset(offset: NDArray[np.float64]) -> NDArray[np.float64]:
 _KEPT_APART = frozenset(
     {
         *("scene", "settings", "agent", "cameras", "map_view", "cache", "base", "listed"),
-        *("look", "chance"),
+        *("look", "chance", "unshown", "lines"),
     }
 )
 """Fields that a snapshot of the objects does not copy."""
@@ -64,6 +64,8 @@ class World(SceneObjects):
         hand: the hand while it is not at rest, None while it is.
         look: the materials and lights that were drawn at random.
         chance: what random actions without a seed of their own draw by.
+        unshown: rows that pictures leave out (``HideObject``).
+        lines: what pictures show beside the room (``VisualizePath``).
         base: a snapshot of the arrangement that ``SetObjectPoses`` made last, None if it made
             none. It must not be changed.
     """
@@ -76,6 +78,8 @@ class World(SceneObjects):
     hand: Hand | None = None
     look: Look = OWN
     chance: Chance = UNSEEDED
+    unshown: frozenset[int] = frozenset()
+    lines: tuple[Line, ...] = ()
 
     @staticmethod
     def load(scene: Scene, settings: Settings) -> World:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from er_gym.sim.agent import Agent
 from er_gym.sim.carrying import Hand, Kept
-from er_gym.sim.look import OWN, Chance, Look
+from er_gym.sim.look import OWN, Chance, Line, Look
 from er_gym.sim.space.line_of_sight_builder import recorded_world
 from er_gym.sim.world import World
 
@@ -54,6 +54,8 @@ def state_of(world: World) -> dict[str, Any]:
         "listed": None if world.listed is None else sorted(world.listed),
         "look": None if world.look == OWN else list(astuple(world.look)),
         "chance": list(astuple(world.chance)),
+        "unshown": sorted(world.unshown),
+        "lines": [list(astuple(line)) for line in world.lines],
         "untouched": world.untouched,
         "agent": [*agent.position.tolist(), agent.rotation, agent.horizon, agent.standing],
     }
@@ -89,6 +91,10 @@ def restore_state(world: World, state: Mapping[str, Any]) -> None:
     world.untouched = state["untouched"]
     world.look = OWN if state["look"] is None else _look_of(*state["look"])
     world.chance = Chance(*state["chance"])
+    world.unshown = frozenset(state["unshown"])
+    world.lines = tuple(
+        Line(name, tuple(map(_triple, points)), *others) for name, points, *others in state["lines"]
+    )
     x, y, z, rotation, horizon, standing = state["agent"]
     # The hand is where its object says, so nothing is carried.
     world.agent = Agent(np.array([x, y, z]), rotation, horizon, standing)

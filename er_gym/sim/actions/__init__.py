@@ -5,10 +5,13 @@ from er_gym.sim.actions import (  # noqa: F401  (imported for their registration
     cameras,
     hand,
     initialize,
+    lines,
     looks,
+    many,
     move,
     navigation,
     no_effect,
+    object_queries,
     open_toggle,
     pick_place,
     place_at_point,
@@ -16,6 +19,7 @@ from er_gym.sim.actions import (  # noqa: F401  (imported for their registration
     push,
     query,
     rotate_look,
+    sight_queries,
     state_change,
 )
 from er_gym.sim.actions.registry import ACTIONS, load_added, perform

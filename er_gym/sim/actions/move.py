@@ -154,6 +154,13 @@ def _mover(heading: float) -> Callable[..., None]:
     return move
 
 
+@action("MoveGlobal")
+def move_global(world: World, *, x: float, z: float) -> None:
+    """Step by metres along the world's axes without turning."""
+    heading = float(np.degrees(np.arctan2(x, z))) - world.agent.rotation
+    _step(world, float(np.hypot(x, z)), heading)
+
+
 for _name, _heading in _HEADINGS.items():
     action(_name)(_mover(_heading))
 

@@ -22,12 +22,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.look import OWN, Look
+from er_gym.sim.look import OWN, Line, Look
 from er_gym.sim.render.appearance import Appearance, appearance_of
 from er_gym.sim.render.bake import bake_of, heading_of, look_of
 from er_gym.sim.render.camera import Camera
+from er_gym.sim.render.lines import line_piece
 from er_gym.sim.render.nodes import FLOOR, made_node, recorded_node, room_node, veil_node
-from er_gym.sim.render.panda import DRAWING, MOST_INSTANCES, Frames, core, rasteriser
+from er_gym.sim.render.panda import DRAWING, MOST_INSTANCES, Frames, core, geometry, rasteriser
 from er_gym.sim.render.place import Place, place_of
 from er_gym.sim.render.shades import shade_of
 from er_gym.sim.render.shapes import UNSEEN
@@ -107,6 +108,7 @@ class SceneGraph:
         # Of the world that is shown: the rows that have changed since it was recorded, and which
         # objects are hidden.
         self._touched: set[int] = set()
+        self._lines: dict[Line, Any] = {}
         self._hidden: NDArray[np.bool_] | None = None
         for k, part in enumerate(bake.around):
             self._root.attachNewNode(self._part(part, 0), k - _BEFORE)
@@ -129,7 +131,8 @@ class SceneGraph:
         lamps = lamps_on(world) if self._soft else ()
         if lamps != self._lamps or world.look != self._look:
             self._build(lamps, world.look)
-        rows, hidden, order = self._rows(world), world.hidden, _order(world)
+        hidden, order = _left_out(world), _order(world)
+        rows = self._rows(world, hidden)
         recorded = bake_of(self._name).recorded
         for i in sorted(rows):
             if i >= len(world) or hidden[i]:
@@ -144,12 +147,22 @@ class SceneGraph:
                 self._place(world, i, order[i])
             if self._soft:
                 self._shade(world, i, order[i])
+        if self._lines or world.lines:
+            self._draw_lines(world.lines)
         self._touched, self._hidden = set(world.touched), hidden.copy()
         self._state = world.cache.state.put(self._key, object())
 
-    def _rows(self, world: World) -> set[int]:
+    def _draw_lines(self, lines: tuple[Line, ...]) -> None:
+        for gone in self._lines.keys() - set(lines):
+            self._lines.pop(gone).removeNode()
+        for line in lines:
+            piece = None if line in self._lines else line_piece(line)
+            if piece is not None:
+                self._lines[line] = self._root.attachNewNode(geometry([piece], 0, "line"), -1)
+
+    def _rows(self, world: World, hidden: NDArray[np.bool_]) -> set[int]:
         """The rows that this world may show in another way than the one that is shown."""
-        hidden, contents = world.hidden, world.contents
+        contents = world.contents
         # An object that has never changed is the same in all worlds of the scene.
         rows = world.touched | self._touched
         if self._soft:  # a shadow depends on what it falls on
@@ -247,6 +260,16 @@ def _put(path: Any, place: Place) -> None:
 def _number(i: int) -> int:
     """The instance of object i; 0 for no instance, as there may be more copies than numbers."""
     return i + 1 if i < MOST_INSTANCES else 0
+
+
+def _left_out(world: World) -> NDArray[np.bool_]:
+    """(N,) the objects that are not drawn: what is in something closed or out of the scene, and
+    what a program has hidden."""
+    if not world.unshown:
+        return world.hidden
+    hidden = world.hidden.copy()
+    hidden[list(world.unshown)] = True
+    return hidden
 
 
 def _order(world: World) -> Sequence[int]:
