@@ -9,10 +9,16 @@ import shlex
 from pathlib import Path
 
 import click
+import pytest
 
 from benchmarks.checks.doc_blocks.blocks import SHELL, Part, blocks, pages
 from benchmarks.cli.main import cli
-from er_gym.sim.actions import ACTIONS
+from er_gym.sim.actions import ACTIONS, perform
+from er_gym.sim.actions.refused import REFUSED
+from er_gym.sim.errors import WrongCall
+from er_gym.sim.scene import load_scene
+from er_gym.sim.settings import Settings
+from er_gym.sim.world import World
 
 
 def test_every_picture_and_page_is_there(repository: Path) -> None:
@@ -21,9 +27,24 @@ def test_every_picture_and_page_is_there(repository: Path) -> None:
             assert (repository / link).exists(), link
 
 
-def test_the_list_of_actions_is_complete(repository: Path) -> None:
+def test_the_table_of_actions_tells_what_each_does(repository: Path) -> None:
     page = (repository / "docs" / "fidelity.md").read_text().partition("## Actions")[2]
-    assert set(re.findall(r"\w+", page)) == {*ACTIONS, "Reset"}
+    rows = re.findall(r"^\| (`.*`) \| (.*) \|$", page, re.MULTILINE)
+    told = {name: here for names, here in rows for name in re.findall(r"`(\w+)`", names)}
+    assert sum(len(re.findall("`", names)) for names, _ in rows) == 2 * len(told)  # none twice
+    refused = {name: here for name, here in told.items() if here.startswith("refused: ")}
+    assert told.keys() - refused.keys() == {*ACTIONS, "Reset"}
+    assert refused == {name: f"refused: {reason}" for name, reason in REFUSED.items()}
+    assert f"{len(ACTIONS) + 1} are taken here, and {len(REFUSED)} are refused" in page
+
+
+def test_each_refused_action_says_why() -> None:
+    world = World.load(load_scene("FloorPlan402"), Settings())
+    for name, reason in REFUSED.items():
+        with pytest.raises(WrongCall, match=re.escape(f"Invalid action: {name}.")) as refusal:
+            perform(world, {"action": name, "anything": 1})
+        assert str(refusal.value).endswith(f"{reason}.")
+        assert str(refusal.value).count(". ") == 1
 
 
 def commands(part: Part) -> list[str]:

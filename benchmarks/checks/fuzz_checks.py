@@ -40,6 +40,13 @@ QUESTIONS = frozenset(
         *("GetCoordinateFromRaycast", "GetSpawnCoordinatesAboveReceptacle", "GetShortestPath"),
         *("GetShortestPathToPoint", "ObjectNavExpertAction", "SetRandomSeed"),
         *("RandomizeColors", "RandomizeMaterials", "RandomizeLighting"),
+        *("ResetMaterials", "ResetColors", "ResetLighting", "ChangeColorOfMaterials"),
+        *("HideObject", "UnhideObject", "HideAllObjects", "UnhideAllObjects", "VisualizePath"),
+        *("HideVisualizedPath", "VisualizeGrid", "HighlightObject", "NoOp", "TogglePhysics"),
+        *("GetObjectMetadata", "GetVisibleObjects", "ObjectsVisibleFromPositions", "BBoxDistance"),
+        *("PerformRaycast", "GetObjectHitFromRaycast", "CheckWhatObjectOn", "VisibleRange"),
+        *("Get2DSemanticHulls", "WorldToViewportPoint", "PositionsFromWhichItemIsInteractable"),
+        *("CheckUnobstructedPathBetweenObjectCenters", "ApproxPercentScreenObjectOccupies"),
         "ChangeQuality",
     }
 )

@@ -14,7 +14,8 @@ from random import Random
 from types import NoneType
 from typing import Any, get_args, get_origin
 
-from er_gym.sim.actions.registry import ACTIONS, EXEMPT, REFUSED, Parameter, parameters_of
+from er_gym.sim.actions.refused import REFUSED
+from er_gym.sim.actions.registry import ACTIONS, EXEMPT, Parameter, parameters_of
 from er_gym.sim.actions.state_change import LIQUIDS
 from er_gym.sim.initial_state import USED_UP
 

@@ -31,6 +31,8 @@ _TAKEN = frozenset(
 """Arguments of the official controller that choose a Unity build; refused here."""
 
 
+_ROBOTHOR = "FloorPlan_"
+"""What the names of RoboTHOR's scenes begin with."""
 _READ_BY_EVENT = ("screenWidth", "screenHeight", "colors")
 _RENAMED = {
     "renderClassImage": "renderSemanticSegmentation",
@@ -166,6 +168,19 @@ class EmbeddedController(ai2thor.controller.Controller):  # type: ignore[misc]  
     server: EmbeddedServer | None
     _last_event: ai2thor.server.Event | None = None
     _stale = False
+
+    def reset(self, scene: Any = None, **arguments: Any) -> ai2thor.server.Event:
+        """Enter a scene, as the official ``reset`` does.
+
+        Raises:
+            ValueError: there is no such scene here.
+        """
+        if isinstance(scene, str) and scene.startswith(_ROBOTHOR):
+            raise ValueError(
+                "The embedded engine has the 120 iTHOR rooms and no RoboTHOR scene such as "
+                f"{scene}; backend='unity' has."
+            )
+        return super().reset(scene, **arguments)
 
     def step(
         self, action: str | dict[str, Any] | None = None, **arguments: Any

@@ -107,4 +107,6 @@ class Engine:
             raise ActionFailed(str(error)) from None
         now = self.world.settings
         fresh = Settings(width=now.width, height=now.height, light=now.light)
+        chance = self.world.chance
         self.world = World.load(scene, fresh)
+        self.world.chance = chance

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from er_gym.sim.agent import HAND_OFFSET
+from er_gym.sim.carrying import hand_point, hand_rotation, in_camera_frame
 from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.sim.object_metadata import box, objects, vector
+from er_gym.sim.rotation import unity_angles
 from er_gym.sim.space.map_camera import map_camera
 from er_gym.sim.space.room_bounds import room_bounds
 from er_gym.sim.world import World
@@ -35,12 +37,14 @@ def _agent(world: World) -> dict[str, Any]:
 
 
 def _held_pose(world: World) -> dict[str, Any]:
-    held, nowhere = world.held, (0.0, 0.0, 0.0)
+    """The pose of the hand, whether it holds anything or not."""
+    agent, hand = world.agent, world.hand
+    turned = hand_rotation(agent, hand)
     return {
-        "localPosition": vector(HAND_OFFSET),
-        "position": vector(nowhere if held < 0 else world.position[held]),
-        "localRotation": vector(nowhere),
-        "rotation": vector(nowhere if held < 0 else world.rotation[held]),
+        "localPosition": vector(HAND_OFFSET if hand is None else HAND_OFFSET + hand.shift),
+        "position": vector(hand_point(agent, hand)),
+        "localRotation": vector(in_camera_frame(agent, turned)),
+        "rotation": vector(unity_angles(turned)),
     }
 
 

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim import initial_state
-from er_gym.sim.agent import HAND_OFFSET, Agent
-from er_gym.sim.rotation import unity_rotation
+from er_gym.sim.agent import Agent
+from er_gym.sim.carrying import Hand, hand_point, poses, still_held
+from er_gym.sim.look import OWN, UNSEEDED, Chance, Line, Look
 from er_gym.sim.scene import Scene
 from er_gym.sim.scene_objects import PROPERTY_COLUMN, STATE_COLUMN, SceneObjects
 from er_gym.sim.settings import Settings, ThirdPartyCamera
@@ -43,7 +44,10 @@ def reversible_offset(offset: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 _KEPT_APART = frozenset(
-    {"scene", "settings", "agent", "cameras", "map_view", "cache", "base", "listed"}
+    {
+        *("scene", "settings", "agent", "cameras", "map_view", "cache", "base", "listed"),
+        *("look", "chance", "unshown", "lines"),
+    }
 )
 """Fields that a snapshot of the objects does not copy."""
 
@@ -57,6 +61,11 @@ class World(SceneObjects):
         agent: the agent's pose.
         cameras: the third-party cameras.
         map_view: whether the agent's picture shows the room from above (``ToggleMapView``).
+        hand: the hand while it is not at rest, None while it is.
+        look: the materials and lights that were drawn at random.
+        chance: what random actions without a seed of their own draw by.
+        unshown: rows that pictures leave out (``HideObject``).
+        lines: what pictures show beside the room (``VisualizePath``).
         base: a snapshot of the arrangement that ``SetObjectPoses`` made last, None if it made
             none. It must not be changed.
     """
@@ -66,6 +75,11 @@ class World(SceneObjects):
     base: World | None = None
     cameras: tuple[ThirdPartyCamera, ...] = ()
     map_view: bool = False
+    hand: Hand | None = None
+    look: Look = OWN
+    chance: Chance = UNSEEDED
+    unshown: frozenset[int] = frozenset()
+    lines: tuple[Line, ...] = ()
 
     @staticmethod
     def load(scene: Scene, settings: Settings) -> World:
@@ -266,7 +280,7 @@ class World(SceneObjects):
     def remove(self, i: int) -> None:
         """Take object i out of the scene; its contents stay where they are."""
         if i == self.held:
-            self.held = -1
+            self.let_go()
         for child in self.contents[i]:
             self.parents[child] = tuple(p for p in self.parents[child] if p != i)
             self._displace([child])
@@ -300,19 +314,42 @@ class World(SceneObjects):
         self._renested()
         return lay_in_it
 
-    def place_agent(self, agent: Agent) -> None:
-        """Put the agent at a pose, with the object that it holds."""
+    def place_agent(self, agent: Agent, *, keep_hand: bool = False) -> None:
+        """Put the agent at a pose, with the object that it holds.
+
+        Args:
+            keep_hand: leave the hand as it is, and do not put it to rest.
+        """
         self.agent = agent
         if self.held >= 0:
-            self.carry()
+            if self.hand is None:
+                self.carry()
+            else:
+                self.pose_hand(self.hand if keep_hand else None)
 
     def carry(self) -> None:
         """Move the held object to the hand."""
         centre = (self.low[self.held] + self.high[self.held]) / 2
-        heading = unity_rotation(np.array([self.agent.horizon, self.agent.rotation, 0.0]))
-        hand = self.agent.camera + heading @ HAND_OFFSET
         # The held object hides nothing, so lines of sight stay valid: no `arrangement_changed`.
-        self._shift(self.in_hand, hand - centre)
+        self._shift(self.in_hand, hand_point(self.agent, self.hand) - centre)
+
+    def pose_hand(self, hand: Hand | None) -> None:
+        """Move and turn the hand, with what it holds; None puts it to rest."""
+        before, self.hand = self.hand, hand
+        if hand is not None and hand.turn is not None:
+            for row, position, rotation in list(poses(self, self.agent, hand)):
+                self.set_pose(row, position, rotation)
+        elif before is not None:
+            origin = self.position[self.held].copy()
+            for each in list(still_held(self, before)):
+                at = origin + each.offset
+                self.set_pose(each.row, at, np.array(each.rotation))
+                self.low[each.row], self.high[each.row] = at + each.low, at + each.high
+        self.carry()
+
+    def let_go(self) -> None:
+        """Empty the hand, which then is at rest."""
+        self.held, self.hand = -1, None
 
     def add_object(self, like: int, object_id: str, object_type: str, name: str) -> int:
         """Append a copy of an object under another id and type; returns its row."""

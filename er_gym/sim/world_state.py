@@ -7,12 +7,15 @@ their numbers, and takes some hundred bytes.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import astuple
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.agent import Agent
+from er_gym.sim.carrying import Hand, Kept
+from er_gym.sim.look import OWN, Chance, Line, Look
 from er_gym.sim.space.line_of_sight_builder import recorded_world
 from er_gym.sim.world import World
 
@@ -46,8 +49,13 @@ def state_of(world: World) -> dict[str, Any]:
         "changed": {name: rows for name, rows in changed.items() if rows is not None},
         "sets": {name: sorted(getattr(world, name)) for name in _SETS},
         "held": world.held,
+        "hand": _plain_hand(world.hand),
         "disabled": [[i, list(rows)] for i, rows in world.disabled.items()],
         "listed": None if world.listed is None else sorted(world.listed),
+        "look": None if world.look == OWN else list(astuple(world.look)),
+        "chance": list(astuple(world.chance)),
+        "unshown": sorted(world.unshown),
+        "lines": [list(astuple(line)) for line in world.lines],
         "untouched": world.untouched,
         "agent": [*agent.position.tolist(), agent.rotation, agent.horizon, agent.standing],
     }
@@ -77,14 +85,47 @@ def restore_state(world: World, state: Mapping[str, Any]) -> None:
         world.changed(changed)
     for name in _SETS:
         setattr(world, name, set(state["sets"][name]))
-    world.held = state["held"]
+    world.held, world.hand = state["held"], _hand_of(state["hand"])
     world.disabled = {i: tuple(rows) for i, rows in state["disabled"]}
     world.listed = None if state["listed"] is None else frozenset(state["listed"])
     world.untouched = state["untouched"]
+    world.look = OWN if state["look"] is None else _look_of(*state["look"])
+    world.chance = Chance(*state["chance"])
+    world.unshown = frozenset(state["unshown"])
+    world.lines = tuple(
+        Line(name, tuple(map(_triple, points)), *others) for name, points, *others in state["lines"]
+    )
     x, y, z, rotation, horizon, standing = state["agent"]
     # The hand is where its object says, so nothing is carried.
     world.agent = Agent(np.array([x, y, z]), rotation, horizon, standing)
     world.cache.state_changed()
+
+
+def _plain_hand(hand: Hand | None) -> list[Any] | None:
+    return None if hand is None else list(astuple(hand))
+
+
+def _hand_of(plain: Sequence[Any] | None) -> Hand | None:
+    if plain is None:
+        return None
+    shift, turn, heading, kept = plain
+    return Hand(
+        _triple(shift),
+        None if turn is None else _triple(turn),
+        heading,
+        tuple(Kept(row, *map(_triple, corners)) for row, *corners in kept),
+    )
+
+
+def _triple(values: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = values
+    return x, y, z
+
+
+def _look_of(
+    materials: int | None, splits: Sequence[str], colors: int | None, light: Sequence[float]
+) -> Look:
+    return Look(materials, tuple(splits), colors, _triple(light))
 
 
 def _base(world: World) -> World:

@@ -50,8 +50,9 @@ def test_picking_up_takes_a_thing_off_its_receptacle(kitchen):
     assert kitchen[APPLE]["parentReceptacles"] is None
     assert APPLE not in kitchen[ISLAND]["receptacleObjectIds"]
     assert kitchen[APPLE]["distance"] < 0.8
-    held = kitchen.event.metadata["heldObjectPose"]["position"]
-    assert held == kitchen[APPLE]["position"]
+    hand = kitchen.event.metadata["heldObjectPose"]
+    assert hand["position"] == pytest.approx(kitchen[APPLE]["position"], abs=0.02)
+    assert hand["localRotation"]["x"] == pytest.approx(-kitchen.agent["cameraHorizon"] % 360)
 
 
 def test_the_hand_holds_one_thing(kitchen):

@@ -147,6 +147,18 @@ def test_a_point_of_the_picture_is_a_point_of_the_room(kitchen):
     assert "[0:1]" in kitchen.refused("GetCoordinateFromRaycast", x=1.5, y=0.5)
 
 
+def test_a_ray_stops_where_ai2thors_own_tests_expect(enter):
+    room = enter("FloorPlan28", width=300, height=300)
+    room.do("TeleportFull", x=-1.5, y=0.901, z=-1.5, rotation=90, horizon=0, standing=True)
+    for at, expected, error in (
+        ((0.5, 0.5), (-0.34426, 1.57600, -1.5), 1e-3),
+        ((0.5, 0.2), (-0.34426, 2.26944, -1.5), 1e-3),
+        ((0.25, 0.5), (-0.60374, 1.57600, -1.05187), 0.016),  # a door is not as thick as its box
+    ):
+        point = room.do("GetCoordinateFromRaycast", x=at[0], y=at[1])
+        assert tuple(point.values()) == pytest.approx(expected, abs=error)
+
+
 def test_a_failed_look_answers_with_its_words(kitchen):
     event = kitchen.step("GetObjectInFrame", x=2.0, y=0.5)
     assert event.metadata["actionReturn"] == event.metadata["errorMessage"] != ""

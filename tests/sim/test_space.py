@@ -333,6 +333,19 @@ def test_no_pose_is_left_out(kitchen, thing):
         assert kitchen[thing]["visible"] is (json.dumps(pose, sort_keys=True) in listed), pose
 
 
+def test_the_poses_of_a_fridge_are_as_many_as_ai2thors_own_tests_expect(enter):
+    room = enter("FloorPlan28")
+    fridge = room.one("Fridge")
+    poses = room.do("GetInteractablePoses", fridge)
+    assert 400 < len(poses) < 600  # 457 when this was written
+    assert 1100 < len(room.do("GetInteractablePoses", fridge, maxDistance=5)) < 1300  # 1249
+    assert room.do("GetInteractablePoses", fridge, rotations=[270]) == []
+    for pose in poses[::80]:
+        told = {"positions": [{key: pose[key] for key in "xyz"}], "standings": [pose["standing"]]}
+        told |= {"rotations": [pose["rotation"]], "horizons": [pose["horizon"]]}
+        assert room.do("GetInteractablePoses", fridge, **told) == [pose]
+
+
 def test_filters_narrow_the_search(kitchen):
     everything = kitchen.do("GetInteractablePoses", APPLE)
     place = {key: everything[0][key] for key in "xyz"}

@@ -3,10 +3,15 @@
 from er_gym.sim.actions import (  # noqa: F401  (imported for their registrations)
     arrange_objects,
     cameras,
+    hand,
     initialize,
+    lines,
+    looks,
+    many,
     move,
     navigation,
     no_effect,
+    object_queries,
     open_toggle,
     pick_place,
     place_at_point,
@@ -14,6 +19,7 @@ from er_gym.sim.actions import (  # noqa: F401  (imported for their registration
     push,
     query,
     rotate_look,
+    sight_queries,
     state_change,
 )
 from er_gym.sim.actions.registry import ACTIONS, load_added, perform

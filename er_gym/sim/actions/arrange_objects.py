@@ -142,7 +142,7 @@ def _set_pose(world: World, i: int, pose: ObjectPose) -> bool:
     rotation = np.array([pose.rotation.x, pose.rotation.y, pose.rotation.z])
     was_held = world.held == i
     if was_held:
-        world.held = -1
+        world.let_go()
     turned = np.abs((rotation - world.rotation[i] + 180.0) % 360.0 - 180.0)
     if not was_held and _is_close(position, world.position[i]) and (turned < _SAME).all():
         return False

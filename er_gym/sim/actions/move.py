@@ -28,7 +28,19 @@ _FINEST = 0.05
 """A grid with a smaller step is not searched for a free position, metres."""
 
 
-def _step(world: World, magnitude: float | None, heading: float) -> None:
+def _step(
+    world: World,
+    magnitude: float | None,
+    heading: float,
+    near: tuple[str, float] | None = None,
+    keep_hand: bool = False,
+) -> None:
+    """Step in a direction.
+
+    Args:
+        near: the id of an object, and how far from it the agent may end, metres.
+        keep_hand: whether the hand stays as it is.
+    """
     size = world.settings.grid_size if magnitude is None else magnitude
     if size <= 0:
         raise ActionFailed(f"moveMagnitude must be > 0, not {size:g}.")
@@ -38,7 +50,9 @@ def _step(world: World, magnitude: float | None, heading: float) -> None:
     if not floor_of(world.scene.name).path_is_clear(start[[0, 2]], end[[0, 2]]):
         by = ", ".join(f"{part + 0.0:.4f}" for part in (end - start).round(4).tolist())
         raise ActionFailed(f"{_obstacle(world, end)} is blocking Agent 0 from moving by ({by}).")
-    world.place_agent(replace(world.agent, position=end))
+    if near is not None:
+        _stay_near(world, end, *near)
+    world.place_agent(replace(world.agent, position=end), keep_hand=keep_hand)
 
 
 def step_ahead(world: World, magnitude: float) -> None:
@@ -130,33 +144,30 @@ def _mover(heading: float) -> Callable[..., None]:
     ) -> None:
         """Step by moveMagnitude metres (default: gridSize) without turning.
 
-        With ``objectId``, the agent stays within ``maxAgentsDistance`` metres of that object. All
-        other arguments have no effect: the held object collides with nothing here.
+        With ``objectId``, the agent stays within ``maxAgentsDistance`` metres of that object.
+        ``manualInteract`` leaves the hand as it is. All other arguments have no effect: the held
+        object collides with nothing here.
         """
-        start, carried = world.agent, world.in_hand
-        were = [array[carried] for array in (world.position, world.low, world.high)]
-        _step(world, moveMagnitude, heading)
-        if objectId and maxAgentsDistance > 0.0:
-            try:
-                _stay_near(world, objectId, maxAgentsDistance)
-            except ActionFailed:
-                world.place_agent(start)
-                # A step forth and back can change the last bits.
-                for array, was in zip((world.position, world.low, world.high), were, strict=True):
-                    array[carried] = was
-                raise
+        near = (objectId, maxAgentsDistance) if objectId and maxAgentsDistance > 0.0 else None
+        _step(world, moveMagnitude, heading, near, manualInteract)
 
     return move
+
+
+@action("MoveGlobal")
+def move_global(world: World, *, x: float, z: float) -> None:
+    """Step by metres along the world's axes without turning."""
+    heading = float(np.degrees(np.arctan2(x, z))) - world.agent.rotation
+    _step(world, float(np.hypot(x, z)), heading)
 
 
 for _name, _heading in _HEADINGS.items():
     action(_name)(_mover(_heading))
 
 
-def _stay_near(world: World, object_id: str, most: float) -> None:
-    """Refuse a position that is farther from an object's box than ``most`` metres."""
+def _stay_near(world: World, here: np.ndarray, object_id: str, most: float) -> None:
+    """Refuse a position (3,) that is farther from an object's box than ``most`` metres."""
     i = world.find(object_id)
-    here = world.agent.position
     gap = np.clip(here, world.low[i], world.high[i]) - here
     if np.hypot(gap[0], gap[2]) > most:
         raise ActionFailed(f"Agent movement would bring it beyond the max distance of {object_id}.")

@@ -19,6 +19,9 @@ from er_gym.sim.world import World
 
 _ALLOWED_ERROR = 0.0001
 """How far from the floor a start or an end may be, metres; AI2-THOR's value."""
+_SNAPS = 0.2
+"""If the start or the end is so near to the floor, the other may be this far from it, metres; so it
+is in AI2-THOR."""
 _YAWS = tuple(range(0, 360, 30))
 _FLOOR = [0, 2]
 
@@ -66,6 +69,9 @@ def _point(x: float, z: float) -> np.ndarray:
 def _path(
     world: World, start: np.ndarray, ends: np.ndarray, what: str, error: float
 ) -> dict[str, Any]:
+    floor = floor_of(world.scene.name)
+    if any(floor.nearest_free(point, error) is not None for point in (start, *ends)):
+        error = max(error, _SNAPS)
     found = shortest_path(world.scene.name, start, ends, error)
     if found is None:
         raise ActionFailed(

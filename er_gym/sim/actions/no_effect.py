@@ -2,104 +2,67 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from er_gym.sim.actions.checks import require, within
-from er_gym.sim.actions.registry import action, quoted
+from er_gym.sim.actions.registry import action
 from er_gym.sim.errors import ActionFailed
-from er_gym.sim.scene import SCENE_NUMBERS
 from er_gym.sim.world import World
 
-_ROOM_TYPES = {
-    "kitchens": "kitchen",
-    "living_rooms": "livingroom",
-    "bedrooms": "bedroom",
-    "bathrooms": "bathroom",
-}
-_ALL_ROOM_TYPES = frozenset({*_ROOM_TYPES.values(), "robothor"})
-_LAST_OF_TRAINING, _LAST_OF_VALIDATION = 20, 25
+_LONGEST = 1e9
+"""Seconds."""
 
 
-@action("SetRandomSeed")
-def set_random_seed(world: World, *, seed: int) -> None:
-    """Accepted: everything random here takes a seed of its own."""
+@action(
+    *("NoOp", "PhysicsSyncTransforms", "TogglePhysics"),
+    *("EnableTemperatureDecay", "DisableTemperatureDecay"),
+    *("MakeAllObjectsMoveable", "MakeObjectsStaticKinematicMassThreshold"),
+    *("MakeAllObjectsBreakable", "MakeAllObjectsUnbreakable"),
+    *("ChangeAgentFaceToNeutral", "ChangeAgentFaceToHappy"),
+    *("ChangeAgentFaceToMad", "ChangeAgentFaceToSuperMad"),
+)
+def do_nothing(world: World) -> None:
+    """Accepted: no time passes here, everything loose can be moved, nothing breaks by itself, and
+    the agent is in no picture."""
 
 
-@action("RandomizeColors", "ChangeColorOfMaterials", "ResetMaterials", "ResetColors")
-def randomize_colors(world: World) -> None:
-    """Accepted: the embedded engine draws the same materials in every run."""
+@action("Sleep")
+def sleep(world: World, *, seconds: int) -> None:
+    """Accepted: nothing happens in the meantime, so none is spent; seconds, 0 or more."""
+    within("seconds", seconds, 0, _LONGEST)
 
 
-@action("RandomizeMaterials")
-def randomize_materials(
-    world: World,
-    *,
-    useTrainMaterials: bool | None = None,
-    useValMaterials: bool | None = None,
-    useTestMaterials: bool | None = None,
-    useExternalMaterials: bool | None = None,
-    inRoomTypes: list[str] | None = None,
-) -> dict[str, Any]:
-    """Accepted: materials do not change. The answer names the splits that AI2-THOR would draw from.
-
-    The default is the scene's own split. Of each kind of room, 20 are for training, 5 for
-    validation and 5 for testing.
-    """
-    number = int(world.scene.name.removeprefix("FloorPlan"))
-    if inRoomTypes is not None:
-        _check_room_types(number, inRoomTypes)
-    place = number % 100
-    train = place <= _LAST_OF_TRAINING
-    validation = not train and place <= _LAST_OF_VALIDATION
-    test = not train and not validation
-    chosen = {
-        "useTrainMaterials": train if useTrainMaterials is None else useTrainMaterials,
-        "useValMaterials": validation if useValMaterials is None else useValMaterials,
-        "useTestMaterials": test if useTestMaterials is None else useTestMaterials,
-        "useExternalMaterials": train if useExternalMaterials is None else useExternalMaterials,
-    }
-    own = ("useTrainMaterials", "useValMaterials", "useTestMaterials")
-    if not any(chosen[name] for name in own):
-        raise ActionFailed(f"At least one of {', '.join(own)} must be true.")
-    return chosen
+@action("ChangeTimeScale", server_action=True)
+def change_time_scale(world: World, *, timeScale: float = 1.0) -> None:
+    """Accepted: no time passes here."""
+    if timeScale <= 0.0:
+        raise ActionFailed(f"Time scale must be >0, not {timeScale:g}.")
 
 
-def _check_room_types(number: int, given: list[str]) -> None:
-    if not given:
-        raise ActionFailed("inRoomTypes must have a non-zero length!")
-    for name in given:
-        if name.lower() not in _ALL_ROOM_TYPES:
-            raise ActionFailed(
-                f"inRoomTypes contains unknown room type: {quoted(name)}. Valid room types are "
-                "Bedroom, Bathroom, LivingRoom, Kitchen and RoboTHOR."
-            )
-    here = next(kind for name, kind in _ROOM_TYPES.items() if number in SCENE_NUMBERS[name])
-    if here not in map(str.lower, given):
-        raise ActionFailed(f"inRoomTypes must include {here!r} inside of a {here} scene.")
+@action("ChangeOpenSpeed", server_action=True)
+def change_open_speed(world: World, *, x: float = 0.0) -> None:
+    """Accepted: doors open at once here."""
 
 
-@action("RandomizeLighting")
-def randomize_lighting(
-    world: World,
-    *,
-    brightness: list[float] | None = None,
-    randomizeColor: bool = True,
-    hue: list[float] | None = None,
-    saturation: list[float] | None = None,
-    synchronized: bool = False,
-) -> None:
-    """Accepted: the light is always the same here. Each range has two numbers."""
-    for name, span, most in (
-        ("brightness", brightness, 1e6),
-        ("hue", hue, 1.0),
-        ("saturation", saturation, 1.0),
-    ):
-        if span is None:
-            continue
-        if len(span) != 2 or span[0] > span[1]:
-            raise ActionFailed(f"{name} must be a lower and an upper bound, not {quoted(span)}.")
-        within(name, span[0], 0.0, most)
-        within(name, span[1], 0.0, most)
+@action("SetTopLevelView")
+def set_top_level_view(world: World, *, topView: bool = False) -> None:
+    """Accepted: ToggleMapView shows the room from above."""
+
+
+@action("ChangeAgentColor")
+def change_agent_color(world: World, *, x: float, y: float, z: float) -> None:
+    """Accepted: the agent is in no picture."""
+
+
+@action("RandomizeSmoothness")
+def randomize_smoothness(world: World, *, objectId: str) -> None:
+    """Accepted: nothing shines here."""
+    world.find(objectId)
+
+
+@action("RandomizeSmoothness")
+def randomize_smoothness_of(world: World, *, objectIds: list[str]) -> None:
+    """Accepted: nothing shines here."""
+    for each in objectIds:
+        world.find(each)
 
 
 @action("SetDecayTemperatureBool")
@@ -107,10 +70,23 @@ def set_decay_temperature(world: World, *, allowDecayTemperature: bool) -> None:
     """Accepted: temperatures do not decay here."""
 
 
+@action("SetTemperatureDecayTime")
+def set_decay_time(world: World, *, decayTime: float) -> None:
+    """Accepted: temperatures do not decay here; seconds, 0 or more."""
+    within("decayTime", decayTime, 0.0, _LONGEST)
+
+
+@action("SetTemperatureDecayTime")
+def set_decay_time_of(world: World, *, objectId: str, decayTime: float) -> None:
+    """Accepted: temperatures do not decay here; seconds, 0 or more."""
+    world.find(objectId)
+    set_decay_time(world, decayTime=decayTime)
+
+
 @action("SetGlobalRoomTempDecayTime")
 def set_global_decay_time(world: World, *, TimeUntilRoomTemp: float = 0.0) -> None:
     """Accepted: temperatures do not decay here; seconds, 0 or more."""
-    within("TimeUntilRoomTemp", TimeUntilRoomTemp, 0.0, 1e9)
+    within("TimeUntilRoomTemp", TimeUntilRoomTemp, 0.0, _LONGEST)
 
 
 @action("SetRoomTempDecayTimeForType")
@@ -118,13 +94,18 @@ def set_decay_time_of_type(
     world: World, *, objectType: str, TimeUntilRoomTemp: float = 0.0
 ) -> None:
     """Accepted: temperatures do not decay here; seconds, 0 or more."""
-    within("TimeUntilRoomTemp", TimeUntilRoomTemp, 0.0, 1e9)
+    within("TimeUntilRoomTemp", TimeUntilRoomTemp, 0.0, _LONGEST)
 
 
 @action("MakeObjectBreakable", "MakeObjectUnbreakable")
 def make_object_breakable(world: World, *, objectId: str) -> None:
     """Accepted: only BreakObject breaks objects here, and it breaks every breakable one."""
     require(world, world.find(objectId), "breakable", "something that can be broken")
+
+
+@action("MakeObjectsOfTypeUnbreakable")
+def make_objects_of_type_unbreakable(world: World, *, objectType: str) -> None:
+    """Accepted: only BreakObject breaks objects here."""
 
 
 @action("SetMassProperties")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import radians, tan
 from typing import Any
 
 import numpy as np
@@ -13,9 +12,12 @@ from numpy.typing import NDArray
 from er_gym.sim.actions.conversion import kind_of
 from er_gym.sim.actions.registry import Parameter, Run, Signature, add_signature, parameters_of
 from er_gym.sim.errors import ActionFailed
-from er_gym.sim.render.view import draw, object_at
-from er_gym.sim.rotation import unity_rotation
+from er_gym.sim.render.view import seen_at
+from er_gym.sim.space.solid_rays import entry
 from er_gym.sim.world import World
+
+_COLLIDER = 0.05
+"""The most that a collider lies before the drawn surface, metres along the view."""
 
 
 def pointed_at(world: World, x: float, y: float) -> str:
@@ -29,32 +31,28 @@ def pointed_at(world: World, x: float, y: float) -> str:
     """
     if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
         raise ActionFailed(f"x/y must be in [0:1], from the upper left corner, not ({x:g}, {y:g}).")
-    found = object_at(world, x, y)
-    if found is None:
+    row, _, _ = seen_at(world, x, y)
+    if row is None:
         raise ActionFailed(f"No SimObject found at (x: {x:g}, y: {y:g}), only the room.")
-    return found
+    return world.object_ids[row]
 
 
 def shown_at(world: World, x: float, y: float) -> NDArray[np.float64]:
     """(3,) metres: the point of the room at a point of the agent's picture.
 
+    AI2-THOR's ray stops at an object's colliders, which have neither grooves nor panels that lie a
+    little back. So where the object's box begins just before the drawn surface, the box counts.
+
     Args:
         x, y: 0 to 1, from the left and from the top.
     """
-    settings, cameras = world.settings, world.cameras
-    world.settings, world.cameras = replace(settings, render_depth=True), ()
-    try:
-        depth = draw(world).depth
-    finally:
-        world.settings, world.cameras = settings, cameras
-    assert depth is not None  # depth was requested
-    column = min(int(x * settings.width), settings.width - 1)
-    row = min(int(y * settings.height), settings.height - 1)
-    half = tan(radians(settings.field_of_view / 2))
-    aspect = settings.width / settings.height
-    ahead = np.array([(2 * x - 1) * half * aspect, (1 - 2 * y) * half, 1.0])
-    heading = unity_rotation(np.array([world.agent.horizon, world.agent.rotation, 0.0]))
-    return np.asarray(world.agent.camera + heading @ (ahead * float(depth[row, column])))
+    row, depth, camera = seen_at(world, x, y)
+    start, way = camera.ray(x, y)
+    if row is not None:
+        box = entry(world, row, start, way)
+        if depth - _COLLIDER <= box < depth:
+            depth = box
+    return np.asarray(start + way * depth)
 
 
 def object_action(*names: str, server_action: bool = False) -> Callable[[Run], Run]:

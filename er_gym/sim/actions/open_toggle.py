@@ -11,7 +11,7 @@ from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.solids import solid_of
 from er_gym.sim.world import World, reversible_offset
 
-_ONLY_SHUT = frozenset({"Microwave"})
+ONLY_SHUT = frozenset({"Microwave"})
 """Types that switch on only while closed and open only while off."""
 
 
@@ -27,6 +27,13 @@ def _slide(world: World, i: int, openness: float) -> None:
         reversible_offset(ahead * depth * share) for share in (world.openness[i], openness)
     )
     world.move_by(i, after - before)
+
+
+def set_openness(world: World, i: int, openness: float) -> None:
+    """Open object i by a fraction of its full opening, or close it with 0."""
+    _slide(world, i, openness)
+    world.openness[i] = openness
+    world.set_state(i, "isOpen", openness > 0.0)
 
 
 @object_action("OpenObject")
@@ -50,11 +57,9 @@ def open_object(
         raise ActionFailed(f"openness must be in [0:1], not {openness:g}.")
     if world.state(i, "isOpen") and world.openness[i] == openness:
         raise ActionFailed(f"{objectId} is open already.")
-    if world.types[i] in _ONLY_SHUT and world.state(i, "isToggled"):
+    if world.types[i] in ONLY_SHUT and world.state(i, "isToggled"):
         raise ActionFailed(f"{objectId} is on; switch it off before opening it.")
-    _slide(world, i, openness)
-    world.openness[i] = openness
-    world.set_state(i, "isOpen", openness > 0.0)
+    set_openness(world, i, openness)
 
 
 @object_action("CloseObject")
@@ -64,9 +69,7 @@ def close_object(world: World, *, objectId: str, forceAction: bool = False) -> N
     require(world, i, "openable", "an openable object")
     if not world.state(i, "isOpen"):
         raise ActionFailed(f"{objectId} is closed already.")
-    _slide(world, i, 0.0)
-    world.openness[i] = 0.0
-    world.set_state(i, "isOpen", False)
+    set_openness(world, i, 0.0)
 
 
 def _toggle(world: World, object_id: str, force: bool, on: bool) -> None:
@@ -78,7 +81,7 @@ def _toggle(world: World, object_id: str, force: bool, on: bool) -> None:
     require(world, i, "toggleable", "a toggleable object")
     if world.state(i, "isToggled") is on:
         raise ActionFailed(f"{object_id} is {'on' if on else 'off'} already.")
-    if on and world.types[i] in _ONLY_SHUT and world.state(i, "isOpen"):
+    if on and world.types[i] in ONLY_SHUT and world.state(i, "isOpen"):
         raise ActionFailed(f"{object_id} must be closed before it is switched on.")
     world.set_state(i, "isToggled", on)
     consequences.apply(world)

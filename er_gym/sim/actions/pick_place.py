@@ -49,7 +49,7 @@ def put_down(world: World, i: int, yaw: float, foot: np.ndarray, parents: list[i
     underside[1] = world.low[i, 1]
     world.move_by(i, foot - underside)
     if i == world.held:
-        world.held = -1
+        world.let_go()
     world.relocate(i, parents)
     consequences.apply(world)
 
@@ -96,8 +96,13 @@ def put_object(
     if not forceAction and not accepts(held, kind):
         raise ActionFailed(f"A {kind} does not take a {held}.")
     near = world.agent.position[[0, 2]]
+    hand = world.hand
+    if hand is not None:  # what is tilted is set upright
+        world.pose_hand(None)
     spot = next(free_spots(world, i, receptacle, near, seen_by=world.agent), None)
     if spot is None:
+        if hand is not None:
+            world.pose_hand(hand)
         raise ActionFailed(f"No valid positions to place {held}: {objectId} has no free space.")
     yaw, foot = spot
     # An object on a plate on a table is on the table too, but one in a fridge is not on the floor.

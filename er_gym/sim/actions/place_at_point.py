@@ -8,7 +8,7 @@ from er_gym.sim import consequences
 from er_gym.sim.actions.checks import FARTHEST, within
 from er_gym.sim.actions.pick_place import fall, shift
 from er_gym.sim.actions.registry import action
-from er_gym.sim.actions.vectors import Vector
+from er_gym.sim.actions.vectors import Vector, array
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.space.clearance import Clearance
 from er_gym.sim.space.placement import spawn_points
@@ -48,14 +48,10 @@ def _sane(*vectors: Vector | None) -> None:
             within(axis, getattr(vector, axis), -FARTHEST, FARTHEST)
 
 
-def _array(vector: Vector) -> np.ndarray:
-    return np.array([vector.x, vector.y, vector.z])
-
-
 def _settle(world: World, i: int, stays: bool) -> None:
     """Update the receptacles of object i. If it is in none, it falls, unless it ``stays``."""
     if i == world.held:
-        world.held = -1
+        world.let_go()
     parents = receptacles_of(world, i)
     if parents or stays:
         world.relocate(i, parents)
@@ -91,10 +87,10 @@ def _moved(
         The obstacle, None if the object has moved.
     """
     rows = [i, *world.inside(i)]
-    arrays = (world.position, world.rotation, world.low, world.high)
-    were = [array[rows].copy() for array in arrays]
+    kept = (world.position, world.rotation, world.low, world.high)
+    were = [each[rows].copy() for each in kept]
     if rotation is not None:
-        world.set_pose(i, world.position[i].copy(), _array(rotation))
+        world.set_pose(i, world.position[i].copy(), array(rotation))
     if standing:
         foot = (world.low[i] + world.high[i]) / 2
         foot[1] = world.low[i, 1]
@@ -107,8 +103,8 @@ def _moved(
     if obstacle is None:
         shift(world, i, offset)
         return None
-    for array, was in zip(arrays, were, strict=True):
-        array[rows] = was
+    for each, was in zip(kept, were, strict=True):
+        each[rows] = was
     world.move_by(i, np.zeros(3))
     return obstacle
 
@@ -128,7 +124,7 @@ def place_object_at_point(
     """
     _sane(position, rotation)
     i = _loose(world, objectId)
-    obstacle = _moved(world, i, rotation, _array(position), forced=False, standing=True)
+    obstacle = _moved(world, i, rotation, array(position), forced=False, standing=True)
     if obstacle is not None:
         raise ActionFailed(f"spawn area not clear ({obstacle}), can't place object at that point")
     _settle(world, i, forceKinematic)
@@ -167,7 +163,7 @@ def teleport_object(
         raise ActionFailed("Cannot teleport object while it is being held.")
     obstacle = None
     for each in wanted:
-        obstacle = _moved(world, i, rotation, _array(each), forceAction)
+        obstacle = _moved(world, i, rotation, array(each), forceAction)
         if obstacle is None:
             _settle(world, i, forceKinematic)
             return

@@ -130,6 +130,14 @@ def on_floor(world: World, places: np.ndarray) -> np.ndarray:
     return np.asarray(places[floor_of(world.scene.name).contains(places)])
 
 
+def places_of(world: World, positions: list[Vector] | None) -> np.ndarray:
+    """(P, 2) x and z of given positions, by default those that the agent reaches, where it can
+    stand."""
+    if positions is None:
+        return on_floor(world, _grid(world, None))
+    return on_floor(world, np.array([(p.x, p.z) for p in positions if _is_near(p)]).reshape(-1, 2))
+
+
 @action("GetInteractablePoses")
 def get_interactable_poses(
     world: World,
@@ -151,18 +159,14 @@ def get_interactable_poses(
     if maxDistance is not None and maxDistance <= 0.0:
         raise ActionFailed(f"maxDistance must be > 0 meters, not {maxDistance:g}.")
     i = world.find(objectId)
-    places = (
-        _grid(world, None)
-        if positions is None
-        else np.array([(p.x, p.z) for p in positions if _is_near(p)]).reshape(-1, 2)
-    )
+    places = places_of(world, positions)
     if rotations is None:
         step = world.settings.rotate_step
         rotations = [k * step for k in range(max(1, int(360 // step)))]
     poses = interactable_poses(
         world,
         i,
-        on_floor(world, places),
+        places,
         rotations,
         HORIZONS if horizons is None else horizons,
         (True, False) if standings is None else standings,

@@ -27,6 +27,7 @@ from typing import Any, get_type_hints
 
 from er_gym.plugins import PluginError, added_objects
 from er_gym.sim.actions.conversion import Kind, Unconvertible, kind_of
+from er_gym.sim.actions.refused import REFUSED
 from er_gym.sim.errors import (
     INVALID_ACTION,
     INVALID_ARGUMENT,
@@ -45,10 +46,6 @@ EXEMPT = frozenset(
     }
 )
 """Arguments that any action may carry."""
-REFUSED = {
-    "CreateHouse": "it has the recorded iTHOR rooms and no procedural houses; backend='unity' has"
-}
-"""Actions of AI2-THOR that the embedded engine lacks, with the reason."""
 REQUIRED: Any = inspect.Parameter.empty
 """The default of a required parameter."""
 _LONGEST_QUOTE = 200

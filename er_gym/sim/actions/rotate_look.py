@@ -20,7 +20,9 @@ LOOK_TOLERANCE = 1e-3
 """Tolerance of these limits, degrees: AI2-THOR itself reports 60.00002."""
 
 
-def _tilt(world: World, action: str, degrees: float, downwards: float) -> None:
+def _tilt(
+    world: World, action: str, degrees: float, downwards: float, keep_hand: bool = False
+) -> None:
     if degrees < 0.0:
         raise ActionFailed(
             f"{action} action requires positive degree value. Invalid value used: {degrees:g}"
@@ -37,7 +39,7 @@ def _tilt(world: World, action: str, degrees: float, downwards: float) -> None:
             f"can't look {limit} the forward horizon; this would tilt the camera to {horizon:g}",
             BEYOND_THE_LIMIT,
         )
-    world.place_agent(replace(world.agent, horizon=horizon))
+    world.place_agent(replace(world.agent, horizon=horizon), keep_hand=keep_hand)
 
 
 def _turner(sign: float) -> Callable[..., None]:
@@ -55,16 +57,19 @@ def _turner(sign: float) -> Callable[..., None]:
     ) -> None:
         """Turn by some degrees (default: rotateStepDegrees).
 
-        All other arguments have no effect: the held object collides with nothing here.
+        ``manualInteract`` leaves the hand as it is. All other arguments have no effect: the held
+        object collides with nothing here.
         """
-        turn(world, sign * (world.settings.rotate_step if degrees is None else degrees))
+        by = world.settings.rotate_step if degrees is None else degrees
+        turn(world, sign * by, keep_hand=manualInteract)
 
     return rotate
 
 
-def turn(world: World, by: float) -> None:
-    """Turn the agent clockwise by some degrees."""
-    world.place_agent(replace(world.agent, rotation=(world.agent.rotation + by) % 360.0))
+def turn(world: World, by: float, *, keep_hand: bool = False) -> None:
+    """Turn the agent clockwise by some degrees; the hand comes to rest unless it is kept."""
+    turned = replace(world.agent, rotation=(world.agent.rotation + by) % 360.0)
+    world.place_agent(turned, keep_hand=keep_hand)
 
 
 action("RotateRight")(_turner(1.0))  # clockwise
@@ -72,15 +77,15 @@ action("RotateLeft")(_turner(-1.0))
 
 
 @action("LookUp", server_action=True)
-def look_up(world: World, *, degrees: float = 0.0) -> None:
+def look_up(world: World, *, degrees: float = 0.0, manualInteract: bool = False) -> None:
     """Tilt the camera up by some degrees (0: by :data:`LOOK_STEP`)."""
-    _tilt(world, "LookUp", degrees, -1.0)
+    _tilt(world, "LookUp", degrees, -1.0, manualInteract)
 
 
 @action("LookDown", server_action=True)
-def look_down(world: World, *, degrees: float = 0.0) -> None:
+def look_down(world: World, *, degrees: float = 0.0, manualInteract: bool = False) -> None:
     """Tilt the camera down, as ``LookUp`` does up."""
-    _tilt(world, "LookDown", degrees, 1.0)
+    _tilt(world, "LookDown", degrees, 1.0, manualInteract)
 
 
 @action("RotateLook", server_action=True)
@@ -89,7 +94,7 @@ def rotate_look(world: World, *, rotation: Vector | None = None, horizon: float 
     if abs(horizon) > 90.0:
         raise ActionFailed(f"horizon must be within -90 and 90 degrees, not {horizon:g}.")
     yaw = 0.0 if rotation is None else rotation.y % 360.0
-    world.place_agent(replace(world.agent, rotation=yaw, horizon=horizon))
+    world.place_agent(replace(world.agent, rotation=yaw, horizon=horizon), keep_hand=True)
 
 
 @action("Stand")
@@ -97,7 +102,7 @@ def stand(world: World) -> None:
     """Stand up."""
     if world.agent.standing:
         raise ActionFailed("The agent is standing already.")
-    world.place_agent(replace(world.agent, standing=True))
+    world.place_agent(replace(world.agent, standing=True), keep_hand=True)
 
 
 @action("Crouch")
@@ -105,4 +110,4 @@ def crouch(world: World) -> None:
     """Crouch: the camera goes down to the height of the agent's centre."""
     if not world.agent.standing:
         raise ActionFailed("The agent is crouching already.")
-    world.place_agent(replace(world.agent, standing=False))
+    world.place_agent(replace(world.agent, standing=False), keep_hand=True)

@@ -152,10 +152,24 @@ _CHANGES: dict[str, tuple[Change, Callable[[World, int], None]]] = {
 
 
 def _changer(change: Change, do: Callable[[World, int], None]) -> Callable[..., None]:
-    def change_state(world: World, *, objectId: str, forceAction: bool = False) -> None:
+    def change_it(world: World, *, objectId: str, forceAction: bool = False) -> None:
         do(world, change.target(world, objectId, forceAction))
 
-    return change_state
+    return change_it
+
+
+def change_state(world: World, i: int, state: str, value: bool) -> None:
+    """Put object i into a state, or out of it if that can be undone, wherever it is."""
+    if state == "isToggled":
+        world.set_state(i, state, value)
+    elif state == "isFilledWithLiquid" and value:
+        consequences.fill(world, i, "water")
+    elif state == "isSliced" and value:
+        _cut_up(world, i, state)
+    else:
+        for change, do in _CHANGES.values():
+            if (change.state, change.becomes) == (state, value):
+                do(world, i)
 
 
 for _name, _row in _CHANGES.items():

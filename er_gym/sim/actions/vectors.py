@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 
@@ -13,6 +15,11 @@ class Vector(BaseModel):
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0
+
+
+def array(vector: Vector) -> NDArray[np.float64]:
+    """(3,) the numbers of a vector."""
+    return np.array([vector.x, vector.y, vector.z])
 
 
 class PartialVector(BaseModel):

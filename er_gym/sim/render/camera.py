@@ -67,6 +67,21 @@ class Camera:
         """World points (..., 3) as pixel x, pixel y and depth: see :meth:`to_pixels`."""
         return self.to_pixels(self.to_view(points))
 
+    def ray(self, x: float, y: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The line of sight through a point of the picture: where it starts, and the vector that
+        advances 1 m along the view axis, both (3,).
+
+        Args:
+            x, y: 0 to 1, from the left and from the top.
+        """
+        aside = np.array([(2 * x - 1) * self.width / self.height, 1 - 2 * y, 0.0])
+        ahead = np.array([0.0, 0.0, 1.0])
+        start = np.array(self.position, dtype=np.float64)
+        if self.orthographic_size is not None:
+            return start + (aside * self.orthographic_size) @ self.axes, ahead @ self.axes
+        half = float(np.tan(np.radians(self.fov) / 2))
+        return start, (aside * half + ahead) @ self.axes
+
     def rays(self) -> NDArray[np.float32]:
         """The ray through each pixel's centre.
 

@@ -22,11 +22,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.look import OWN, Line, Look
 from er_gym.sim.render.appearance import Appearance, appearance_of
 from er_gym.sim.render.bake import bake_of, heading_of, look_of
 from er_gym.sim.render.camera import Camera
+from er_gym.sim.render.lines import line_piece
 from er_gym.sim.render.nodes import FLOOR, made_node, recorded_node, room_node, veil_node
-from er_gym.sim.render.panda import DRAWING, MOST_INSTANCES, Frames, core, rasteriser
+from er_gym.sim.render.panda import DRAWING, MOST_INSTANCES, Frames, core, geometry, rasteriser
 from er_gym.sim.render.place import Place, place_of
 from er_gym.sim.render.shades import shade_of
 from er_gym.sim.render.shapes import UNSEEN
@@ -81,7 +83,7 @@ class SceneGraph:
 
     def __init__(self, scene_name: str, light: str = SOFT) -> None:
         self._name, self._soft, self._key = scene_name, light == SOFT, _SHOWN[light]
-        self._build(())
+        self._build((), OWN)
         self._state: object | None = object()  # the state that it shows; None while it changes
 
     def draw(
@@ -96,16 +98,17 @@ class SceneGraph:
             veils = self._veils if self._soft else None
             return rasteriser().draw(self._root, camera, depth, ids=ids, veils=veils)
 
-    def _build(self, lamps: tuple[Lamp, ...]) -> None:
-        """Build the room without its objects, in the light of some lamps."""
+    def _build(self, lamps: tuple[Lamp, ...], look: Look) -> None:
+        """Build the room without its objects, in the light of some lamps and in a look."""
         bake = bake_of(self._name)
         self._root = core().NodePath(self._name)
-        self._lamps = lamps
+        self._lamps, self._look = lamps, look
         self._placed: dict[int, _Placed] = {}
         self._shaded: dict[int, _Shaded] = {}
         # Of the world that is shown: the rows that have changed since it was recorded, and which
         # objects are hidden.
         self._touched: set[int] = set()
+        self._lines: dict[Line, Any] = {}
         self._hidden: NDArray[np.bool_] | None = None
         for k, part in enumerate(bake.around):
             self._root.attachNewNode(self._part(part, 0), k - _BEFORE)
@@ -118,7 +121,7 @@ class SceneGraph:
         """Update everything that has changed in the world."""
         before, self._state = self._state, None
         if before is None:  # an exception left it half updated
-            self._build(self._lamps)
+            self._build(self._lamps, self._look)
         elif world.cache.state.get(self._key) is before:
             for i in world.in_hand:  # nothing but the hand has moved
                 if i in self._placed:
@@ -126,9 +129,10 @@ class SceneGraph:
             self._state = before
             return
         lamps = lamps_on(world) if self._soft else ()
-        if lamps != self._lamps:
-            self._build(lamps)
-        rows, hidden, order = self._rows(world), world.hidden, _order(world)
+        if lamps != self._lamps or world.look != self._look:
+            self._build(lamps, world.look)
+        hidden, order = _left_out(world), _order(world)
+        rows = self._rows(world, hidden)
         recorded = bake_of(self._name).recorded
         for i in sorted(rows):
             if i >= len(world) or hidden[i]:
@@ -143,12 +147,22 @@ class SceneGraph:
                 self._place(world, i, order[i])
             if self._soft:
                 self._shade(world, i, order[i])
+        if self._lines or world.lines:
+            self._draw_lines(world.lines)
         self._touched, self._hidden = set(world.touched), hidden.copy()
         self._state = world.cache.state.put(self._key, object())
 
-    def _rows(self, world: World) -> set[int]:
+    def _draw_lines(self, lines: tuple[Line, ...]) -> None:
+        for gone in self._lines.keys() - set(lines):
+            self._lines.pop(gone).removeNode()
+        for line in lines:
+            piece = None if line in self._lines else line_piece(line)
+            if piece is not None:
+                self._lines[line] = self._root.attachNewNode(geometry([piece], 0, "line"), -1)
+
+    def _rows(self, world: World, hidden: NDArray[np.bool_]) -> set[int]:
         """The rows that this world may show in another way than the one that is shown."""
-        hidden, contents = world.hidden, world.contents
+        contents = world.contents
         # An object that has never changed is the same in all worlds of the scene.
         rows = world.touched | self._touched
         if self._soft:  # a shadow depends on what it falls on
@@ -180,7 +194,7 @@ class SceneGraph:
         lit_at = place if self._soft else None
         if before is None or (before.look, before.order, before.lit_at) != (look, i, lit_at):
             lamps = self._lamps if self._soft else ()
-            node = recorded_node(self._name, look, lit_at, lamps, _number(i), kind)
+            node = recorded_node(self._name, look, lit_at, lamps, _number(i), kind, self._look)
             path = self._attach(i, node.makeCopy(), i)
         else:
             path = before.path
@@ -196,7 +210,7 @@ class SceneGraph:
         if before is None or (before.look, before.order, before.lit_at) != (look, order, lit_at):
             lamps = () if lit_at is None else self._lamps
             # A copy shares the triangles, and its place is a property of the node.
-            node = made_node(seen, heading, lit_at, lamps, _number(i)).makeCopy()
+            node = made_node(seen, heading, lit_at, lamps, _number(i), self._look).makeCopy()
             path = self._attach(i, node, order)
         else:
             path = before.path
@@ -230,7 +244,7 @@ class SceneGraph:
     def _part(self, part: str, number: int) -> Any:
         """A part of the room itself."""
         lit_at = Place() if self._soft else None
-        return room_node(self._name, part, lit_at, self._lamps, number).makeCopy()
+        return room_node(self._name, part, lit_at, self._lamps, number, self._look).makeCopy()
 
 
 def _all_same(one: tuple[object, ...], other: tuple[object, ...]) -> bool:
@@ -246,6 +260,16 @@ def _put(path: Any, place: Place) -> None:
 def _number(i: int) -> int:
     """The instance of object i; 0 for no instance, as there may be more copies than numbers."""
     return i + 1 if i < MOST_INSTANCES else 0
+
+
+def _left_out(world: World) -> NDArray[np.bool_]:
+    """(N,) the objects that are not drawn: what is in something closed or out of the scene, and
+    what a program has hidden."""
+    if not world.unshown:
+        return world.hidden
+    hidden = world.hidden.copy()
+    hidden[list(world.unshown)] = True
+    return hidden
 
 
 def _order(world: World) -> Sequence[int]:

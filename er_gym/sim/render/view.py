@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.agent import Agent
+from er_gym.sim.look import Look
 from er_gym.sim.metadata import instance_color
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.settings import Settings, ThirdPartyCamera
@@ -55,12 +56,14 @@ class _Kept:
     settings: Settings
     cameras: tuple[ThirdPartyCamera, ...]
     map_view: bool
+    look: Look
     view: View
 
     def shows(self, world: World) -> bool:
         # A moving agent is replaced as a whole, and the held object moves only with it.
         same = self.agent is world.agent and self.settings == world.settings
-        return same and self.cameras == world.cameras and self.map_view == world.map_view
+        same = same and self.cameras == world.cameras and self.map_view == world.map_view
+        return same and self.look == world.look
 
 
 _VIEW: CacheKey[_Kept] = CacheKey("view")
@@ -86,23 +89,26 @@ def draw(world: World) -> View:
     first, *others = (_draw(world, camera) for camera in _cameras(world))
     view = replace(first, third_party=tuple(others))
     world.cache.state.put(
-        _VIEW, _Kept(world.agent, world.settings, world.cameras, world.map_view, view)
+        _VIEW,
+        _Kept(world.agent, world.settings, world.cameras, world.map_view, world.look, view),
     )
     return view
 
 
-def object_at(world: World, x: float, y: float) -> str | None:
-    """The id of the object at a point of the agent's picture, None for the room.
+def seen_at(world: World, x: float, y: float) -> tuple[int | None, float, Camera]:
+    """What is at a point of the agent's picture: the row of the object, None for the room; its
+    depth in metres along the view; and the camera.
 
     Args:
         x, y: 0 to 1, from the left and from the top.
     """
-    settings = world.settings
-    frames = _frames(world, next(_cameras(world)))
+    settings, camera = world.settings, next(_cameras(world))
+    frames = _frames(world, camera, depth=True)
     column = min(int(x * settings.width), settings.width - 1)
     row = min(int(y * settings.height), settings.height - 1)
     seen = int(frames.ids[row, column])
-    return world.object_ids[seen - 1] if seen else None
+    assert frames.depth is not None  # depth was requested
+    return seen - 1 if seen else None, float(frames.depth[row, column]), camera
 
 
 def _cameras(world: World) -> Iterator[Camera]:

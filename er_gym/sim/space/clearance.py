@@ -33,10 +33,10 @@ class Clearance:
         self._ids = world.object_ids
         self._low, self._high = world.low[i].copy(), world.high[i].copy()
         # Boxes that it already overlaps where it is are not obstacles: recorded boxes are rough.
-        self._beside = ~self._overlaps(np.zeros(3))
+        self._beside = ~self._overlaps(self._low, self._high)
 
-    def _overlaps(self, offset: NDArray[np.float64]) -> NDArray[np.bool_]:
-        low, high = self._low + offset + _SKIN, self._high + offset - _SKIN
+    def _overlaps(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.bool_]:
+        low, high = low + _SKIN, high - _SKIN
         high = np.maximum(low + 1e-6, high)  # a box thinner than that is tested at its lower side
         return np.asarray(((self._boxes[:, 0] < high) & (self._boxes[:, 1] > low)).all(axis=1))
 
@@ -55,11 +55,24 @@ class Clearance:
             (self._high + offset)[_FLOOR] > high[_FLOOR]
         ).any():
             return "a wall"
-        met = self._overlaps(offset)
-        if not placing:
-            met &= self._beside
+        met = self._overlaps(self._low + offset, self._high + offset)
+        return self._first(met if placing else met & self._beside)
+
+    def met_by(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> str | None:
+        """The obstacle that the object newly meets in another box, (3,) corners in metres; None if
+        there is none."""
+        return self._first(self._overlaps(low, high) & self._beside)
+
+    def _first(self, met: NDArray[np.bool_]) -> str | None:
         rows = self._whose[met]
         return self._ids[rows[0]] if len(rows) else None
+
+    def on_the_way(self, offset: NDArray[np.float64]) -> str | None:
+        """The obstacle that the object meets on a straight way of (3,) metres; None if there is
+        none."""
+        steps = max(1, int(np.ceil(np.linalg.norm(offset) / _STEP)))
+        met = (self.obstacle(offset * (k + 1) / steps) for k in range(steps))
+        return next((each for each in met if each is not None), None)
 
     def slide_distance(self, ahead: NDArray[np.float64], reach: float) -> float:
         """How far the object slides along a level (3,) direction until it meets an obstacle,
