@@ -25,6 +25,7 @@ _TASKS = {*_BASE, "er_gym.thor", "er_gym.tasks"}
 _ENVS = {*_TASKS, "er_gym.envs"}
 _ROLLOUT = {*_ENVS, "er_gym.resumable", "er_gym.rollout"}
 _DATA = {*_ROLLOUT, "er_gym", "er_gym.data"}
+_INTEGRATIONS = {*_DATA, "er_gym.integrations"}
 _VLM = {"agents.vlm.parsing", "agents.vlm", "agents.vlm.clients"}
 _OF_AGENTS = {
     "agents.configs": set(),
@@ -53,7 +54,7 @@ _AGENTS = {*_DATA, *_OF_AGENTS}
 _SCORING = {*_DATA, "benchmarks.scoring", "benchmarks.terminal"}
 _STUDY = {*_AGENTS, *_SCORING, "benchmarks.study"}
 _MONITOR = {*_STUDY, "benchmarks.vlm_run", "benchmarks.monitor"}
-_COMMAND = {*_MONITOR, "benchmarks", "benchmarks.cli"}
+_COMMAND = {*_MONITOR, "er_gym.integrations", "benchmarks", "benchmarks.cli"}
 _HARNESS = {*_COMMAND, "benchmarks.harness"}
 _SCRIPTS = {*_HARNESS, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "benchmarks.pages"}
 ALLOWED = {
@@ -73,6 +74,7 @@ ALLOWED = {
     # What the package offers by itself; it imports most of that when it is asked for.
     "er_gym": _ROLLOUT,
     "er_gym.data": _DATA,
+    "er_gym.integrations": _INTEGRATIONS,
     **{name: {*_DATA, name, *others} for name, others in _OF_AGENTS.items()},
     "benchmarks.scoring": _SCORING,
     "benchmarks.terminal": {*_ENVS, "benchmarks.terminal"},

@@ -21,6 +21,7 @@ from typing import Any
 import er_gym
 from benchmarks.cli.activity import doing
 from benchmarks.cli.extras import claimants, extras, installed_version, state_of
+from er_gym.integrations.plugs import PLUGS, installed, lacks
 from er_gym.plugins import NOT_FROM_HERE
 from er_gym.thor import SCENE_NAMES, compiled_kernel, make_controller
 from er_gym.thor.client_folder import GpuMapping, Release
@@ -235,6 +236,16 @@ def _extras() -> Iterator[Check]:
         yield Check(f"extra {name}", False, ", ".join(lacks), fix)
 
 
+def _plugs() -> Iterator[Check]:
+    for plug in PLUGS:
+        problems = ", ".join(lacks(plug))
+        part = f"plug {plug.name}"
+        if problems:
+            yield Check(part, False, problems, plug.install)
+        else:
+            yield Check(part, True, f"{installed(plug)}; {plug.page}")
+
+
 def _packages() -> Iterator[Check]:
     """Whether ``agents`` and ``benchmarks``, common names for packages, are ours here."""
     for name in ("agents", "benchmarks"):
@@ -292,5 +303,6 @@ _PARTS: dict[str, Callable[[], Iterator[Check]]] = {
     "the GPU": _gpu,
     "the packages": _packages,
     "the extras": _extras,
+    "the plugs": _plugs,
 }
 """What is checked, and how."""

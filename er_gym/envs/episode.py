@@ -389,6 +389,7 @@ class Episode:
             steps=self._steps,
             max_steps=self.max_steps,
             annotate=self._settings.annotate,
+            understood=action is not None or success,
             views=views,
         )
         info: Info = {

@@ -45,11 +45,13 @@ REPEATED = Sentence(
     "You have tried to {action} {times} times in a row, so the episode ends.",
     "你已经连续 {times} 次尝试 {action}，所以这一回合结束。",
 )
+SAY = Sentence(
+    "Say one of: {alone}; or one of {others} with an object type, such as 'navigate to Fridge'.",
+    "请说其中之一：{alone}；或者 {others} 之一加上物体类型，例如 'navigate to Fridge'。",
+)
 NO_ACTION = Sentence(
-    "{quoted} names no action. Say one of: {alone}; or one of {others} with an object type, such "
-    "as 'navigate to Fridge'.",
-    "{quoted} 不是一个动作。请说其中之一：{alone}；或者 {others} 之一加上物体类型，例如 "
-    "'navigate to Fridge'。",
+    f"{{quoted}} names no action. {SAY.en}",
+    f"{{quoted}} 不是一个动作。{SAY.zh}",
 )
 
 # -- why an action is illegal ----------------------------------------------------------------------

@@ -10,7 +10,7 @@ import re
 import string
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import astuple, dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from math import cos, radians, sin
 from typing import Any
 
@@ -203,6 +203,7 @@ class Situation:
     Attributes:
         at: index of the type last navigated to, None before that.
         annotate: whether object types are written into pictures.
+        understood: whether the last reply named an action.
         views: after ``observe``, what the agent perceived in each direction.
     """
 
@@ -217,6 +218,7 @@ class Situation:
     steps: int
     max_steps: int
     annotate: bool = False
+    understood: bool = True
     views: Mapping[str, Perception] = field(default_factory=dict)
 
     @property
@@ -299,17 +301,36 @@ def _plain(text: str) -> str:
     return _OTHER.sub("?", text.translate(_LOOKALIKES))[:_TEXT_LENGTH]
 
 
-def text_of(situation: Situation) -> str:
-    """The observation ``text``."""
-    perception = situation.perception
-    lines = (
+TEXTS = ("text_task", "text_caption", "text_targets", "text")
+"""The observations in words, each with what it tells beyond the one before:
+
+- ``text_task``: the task, the steps, and whether the last action worked;
+- ``text_caption``: what the agent sees and holds;
+- ``text_targets``: what it may navigate to, and what is within reach;
+- ``text``: why an action did not work.
+"""
+_NO_HINT = "That did not work."
+
+
+def text_of(situation: Situation, kind: str = TEXTS[-1]) -> str:
+    """One of :data:`TEXTS`. A reply that names no action is told the actions in each of them."""
+    perception, much = situation.perception, TEXTS.index(kind)
+    hinted = kind == TEXTS[-1] or situation.success or not situation.understood
+    lines = [
         f"Task: {situation.instruction}",
-        f"Step {situation.steps} of {situation.max_steps}. {situation.feedback}",
-        f"You see: {', '.join(perception.visible_names) or 'nothing'}.",
-        f"You hold: {perception.held_name or 'nothing'}.",
-        f"You can navigate to: {', '.join(situation.known.names) or 'nothing'}.",
-        f"Within reach: {', '.join(situation.available.in_reach) or 'nothing'}.",
-    )
+        f"Step {situation.steps} of {situation.max_steps}. "
+        f"{situation.feedback if hinted else _NO_HINT}",
+    ]
+    if much >= TEXTS.index("text_caption"):
+        lines += [
+            f"You see: {', '.join(perception.visible_names) or 'nothing'}.",
+            f"You hold: {perception.held_name or 'nothing'}.",
+        ]
+    if much >= TEXTS.index("text_targets"):
+        lines += [
+            f"You can navigate to: {', '.join(situation.known.names) or 'nothing'}.",
+            f"Within reach: {', '.join(situation.available.in_reach) or 'nothing'}.",
+        ]
     return _plain("\n".join(lines))
 
 
@@ -428,10 +449,13 @@ OBSERVATIONS: Registry[Observation] = Registry(
         "state": Observation(
             lambda width, height: spaces.Box(-1.0, 1.0, (len(STATE_LAYOUT),), np.float32), _state
         ),
-        "text": Observation(
-            lambda width, height: TextSpace(_TEXT_LENGTH, min_length=1, charset=_CHARACTERS),
-            text_of,
-        ),
+        **{
+            name: Observation(
+                lambda width, height: TextSpace(_TEXT_LENGTH, min_length=1, charset=_CHARACTERS),
+                partial(text_of, kind=name),
+            )
+            for name in TEXTS
+        },
     },
     expected=f"an {__name__}.Observation",
     fits=lambda row: isinstance(row, Observation),

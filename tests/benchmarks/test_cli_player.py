@@ -11,6 +11,7 @@ import pytest
 from benchmarks.cli import doctor_checks
 from benchmarks.cli import main as cli
 from benchmarks.cli.extras import extras, state_of
+from er_gym.integrations.plugs import PLUGS, lacks
 from er_gym.thor import player_install as players
 from er_gym.thor.client_folder import GpuMapping, Release
 
@@ -118,6 +119,7 @@ def lines(out: str) -> dict[str, str]:
     ]
     parts += ["package agents", "package benchmarks", "package cv2"]
     parts += [f"extra {name}" for name in extras()]
+    parts += [f"plug {plug.name}" for plug in PLUGS]
     found = {
         part: line for line in out.splitlines() for part in parts if line[4:].startswith(f"{part} ")
     }
@@ -172,6 +174,9 @@ def test_doctor_has_a_line_for_each_part(er_gym, the_client, home):
         assert all(f"{each} missing" in line[f"extra {name}"] for each in state.missing)
         if state.missing:
             assert line[f"extra {name}"].endswith(f"; pip install 'er-gym[{name}]'")
+    for plug in PLUGS:
+        problems = ", ".join(lacks(plug))
+        assert line[f"plug {plug.name}"].startswith(f"--  {problems}; " if problems else "ok ")
 
 
 def test_doctor_tells_the_player_from_unity(er_gym, the_client):
