@@ -26,6 +26,8 @@ MAY_USE = {
     "er_gym/rollout/cluster": ("ray",),
     "er_gym/writing/pictures.py": ("charts",),
     "er_gym/data/exports": ("data", "minari"),
+    "er_gym/integrations/mcp.py": ("mcp",),
+    "er_gym/integrations/openenv.py": ("openenv",),
     "agents": (),
     "agents/finetune": ("finetune",),
     "agents/finetune/gguf_model.py": ("finetune", "gguf"),
@@ -48,6 +50,7 @@ MAY_USE = {
     "benchmarks/scoring/drawing.py": ("charts",),
     "benchmarks/cli/doctor_ray.py": ("ray",),
     "benchmarks/cli/inspect.py": ("inspect",),
+    "benchmarks/cli/plugs.py": ("mcp", "openenv"),
     "benchmarks/cli/trackers.py": ("rl",),
     "benchmarks/cli/ui.py": ("ui",),
     "benchmarks/monitor": ("ui", "vlm"),
@@ -57,7 +60,7 @@ MAY_USE = {
     "benchmarks/checks": ("dev",),
     "benchmarks/pages": ("dev",),
     "examples": ("trl",),
-    "tests": ("dev", "inspect"),
+    "tests": ("dev", "inspect", "openenv"),
 }
 """Folder or file to the extras whose packages it may import, besides the core's; the longest that
 fits counts."""
@@ -117,9 +120,13 @@ def third_party(path: Path) -> set[str]:
     return {name.partition(".")[0] for name in names} - IGNORED
 
 
+NAMED_OTHERWISE = {"openenv": ["openenv-core"]}
+"""What a package belongs to, where that is not installed."""
+
+
 @cache
 def distributions() -> dict[str, list[str]]:
-    return {
+    return NAMED_OTHERWISE | {
         top: [canonicalize_name(name) for name in names]
         for top, names in packages_distributions().items()
     }

@@ -24,6 +24,8 @@ from benchmarks.cli.extras import extras
 from benchmarks.harness.output import ROOT
 from benchmarks.harness.tally import end
 
+_BY_THEMSELVES = ("openenv",)
+"""The extras that do not go with constraints.txt; pyproject.toml says why."""
 _TRIED = "charts,ui,vlm"
 """The extras of the commands that are tried."""
 
@@ -71,7 +73,9 @@ def installed(environment: Path) -> Path:
 
 def resolve(python: Path, extra: str) -> str:
     """Pip's answer to a dry installation of the checkout with an extra ("": none)."""
-    asked = [str(python), "-m", "pip", "install", "--dry-run", "--constraint", "constraints.txt"]
+    asked = [str(python), "-m", "pip", "install", "--dry-run"]
+    if extra not in _BY_THEMSELVES:
+        asked += ["--constraint", "constraints.txt"]
     done = subprocess.run(
         [*asked, f".[{extra}]" if extra else "."], cwd=ROOT, capture_output=True, text=True
     )

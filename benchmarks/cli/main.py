@@ -32,6 +32,7 @@ from benchmarks.cli.inspect import inspect
 from benchmarks.cli.new_model import new_model
 from benchmarks.cli.options import FOLDER, scorer_option
 from benchmarks.cli.player import player
+from benchmarks.cli.plugs import mcp, openenv
 from benchmarks.cli.prompts import prompts
 from benchmarks.cli.render import play, render
 from benchmarks.cli.replay import replay
@@ -128,6 +129,8 @@ cli.add_command(ablate)
 cli.add_command(ui)
 cli.add_command(new_model)
 cli.add_command(zoo)
+cli.add_command(openenv)
+cli.add_command(mcp)
 
 
 @cli.command()

@@ -6,7 +6,6 @@ import contextlib
 import os
 import secrets
 import shutil
-import socket
 import subprocess
 import sys
 import threading
@@ -16,12 +15,12 @@ from types import FrameType
 import click
 
 from benchmarks.cli.errors import BadInput, needing
+from benchmarks.cli.listener import LOOPBACK, listen
 from benchmarks.cli.options import EXISTING_FOLDER, FOLDER, port_option, with_options
 from benchmarks.cli.ui_export import FileOptions, write_files
 from benchmarks.cli.vlm_options import VLMOptions
 from benchmarks.terminal import echo
 
-_LOOPBACK = "127.0.0.1"
 _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
 """One of these is set where xdg-open can show something."""
 
@@ -49,7 +48,7 @@ def _open_browser(address: str) -> None:
 @click.argument("folders", nargs=-1, type=EXISTING_FOLDER, metavar="[FOLDER]...")
 @click.option(
     "--host",
-    default=_LOOPBACK,
+    default=LOOPBACK,
     show_default=True,
     help="The address to listen on. Any other than this machine's own needs a token, which is "
     "printed.",
@@ -95,18 +94,10 @@ def ui(
     missing = next((root for root in roots if not root.is_dir()), None)
     if missing is not None:
         raise BadInput(f"{missing} does not exist; give the folder that holds your runs")
-    local = host in (_LOOPBACK, "localhost", "::1")
+    local = host in (LOOPBACK, "localhost", "::1")
     secret = "" if local and token is None else (token or secrets.token_urlsafe(18))
-    try:
-        listener = socket.create_server(
-            (host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET
-        )
-    except OSError as error:
-        raise BadInput(
-            f"cannot listen on {host}:{port}: {error.strerror or error}; choose another --port"
-        ) from None
-    shown = f"[{host}]" if ":" in host else host
-    address = f"http://{shown}:{listener.getsockname()[1]}/"
+    listener, place = listen(host, port)
+    address = f"http://{place}/"
     address += f"?token={secret}" if secret else ""
     echo(address)
     if not no_browser:

@@ -41,7 +41,26 @@ class Plug:
         )
 
 
-PLUGS: tuple[Plug, ...] = ()
+PLUGS: tuple[Plug, ...] = (
+    Plug(
+        name="mcp",
+        title="Model Context Protocol",
+        module="er_gym.integrations.mcp",
+        requires=("mcp>=2.3", "mcp-types>=2.3", "uvicorn>=0.35"),
+        tried="mcp 2.3.0",
+        page="docs/integrations/mcp.md",
+        extra="mcp",
+    ),
+    Plug(
+        name="openenv",
+        title="OpenEnv",
+        module="er_gym.integrations.openenv",
+        requires=("fastapi>=0.120", "openenv-core>=0.3", "uvicorn>=0.35"),
+        tried="openenv-core 0.3.0",
+        page="docs/integrations/openenv.md",
+        extra="openenv",
+    ),
+)
 """Every plug, in alphabetical order."""
 
 
