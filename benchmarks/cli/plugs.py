@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import click
@@ -13,6 +14,7 @@ import click
 from benchmarks.cli.errors import bad_input, needing
 from benchmarks.cli.listener import LOOPBACK, listen
 from benchmarks.cli.options import (
+    FOLDER,
     Finite,
     OptionGroup,
     given_size,
@@ -105,13 +107,26 @@ class SessionOptions(OptionGroup):
     show_default=True,
     help="The number of processes; each connection stays with one of them.",
 )
+@click.option(
+    "--hub-folder",
+    type=FOLDER,
+    metavar="DIR",
+    help="Serve nothing, and write the folder that OpenEnv's hub builds a server from.",
+)
 @with_options(options=SessionOptions)
-def openenv(host: str, port: int, workers: int, options: SessionOptions) -> int:
+def openenv(
+    host: str, port: int, workers: int, hub_folder: Path | None, options: SessionOptions
+) -> int:
     """Serve er-gym to clients of OpenEnv: each connection plays in an environment of its own."""
     with needing("er-gym openenv", "er-gym[openenv]"):
         import uvicorn
 
-        from er_gym.integrations.openenv import SETTINGS, make_app
+        from er_gym.integrations.openenv import SETTINGS, make_app, write_hub_folder
+    if hub_folder is not None:
+        with bad_input():
+            write_hub_folder(hub_folder)
+        echo(f"{hub_folder}: put a wheel of er-gym into {hub_folder}/wheels, then openenv push")
+        return 0
     given = {
         "max_sessions": options.sessions,
         "idle_seconds": options.idle,

@@ -10,7 +10,9 @@ from __future__ import annotations
 import base64
 import json
 import os
+import shutil
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -24,7 +26,9 @@ from pydantic import Field
 
 from er_gym.envs.errors import ResetNeeded
 from er_gym.integrations.session import Session, Turn, png
+from er_gym.tasks.suites import config_directory
 from er_gym.version import __version__
+from er_gym.writing.folders import whole_folder
 
 MAX_SESSIONS = 64
 IDLE_SECONDS = 600.0
@@ -180,3 +184,18 @@ async def _refused(status: int, request: Request, error: Exception) -> JSONRespo
 def app_of_variable() -> FastAPI:
     """The server of the arguments in :data:`SETTINGS`."""
     return make_app(**json.loads(os.environ.get(SETTINGS, "{}")))
+
+
+def write_hub_folder(path: Path) -> None:
+    """Write the folder from which OpenEnv's hub builds a server: manifest, Dockerfile, server.
+
+    Raises:
+        ForeignFile, CannotWrite: something else is there, or it cannot be written.
+    """
+    with whole_folder(path) as draft:
+        shutil.copytree(
+            config_directory("openenv"),
+            draft,
+            dirs_exist_ok=True,
+            ignore=shutil.ignore_patterns("__pycache__"),
+        )

@@ -6,6 +6,8 @@ import json
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
@@ -16,7 +18,10 @@ from conformance import SETTINGS, Answer, Course, differences
 pytest.importorskip("openenv.core", reason="openenv-core is not installed")
 
 import uvicorn
+import yaml
+from openenv.cli._validation import validate_multi_mode_deployment
 from openenv.core import GenericEnvClient
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from er_gym.integrations import openenv
@@ -134,7 +139,8 @@ def test_a_full_server_says_so_and_has_room_again() -> None:
 
     def told() -> dict[str, Any]:
         with connect(f"ws://{server.place}/ws") as socket:
-            socket.send(json.dumps({"type": "reset", "data": {"task": TASK}}))
+            with suppress(ConnectionClosed):  # a full server does not wait for it
+                socket.send(json.dumps({"type": "reset", "data": {"task": TASK}}))
             return dict(json.loads(socket.recv()))
 
     with server.client() as first:
@@ -232,3 +238,13 @@ def test_the_app_of_other_processes_has_the_same_settings(monkeypatch: pytest.Mo
         openenv.app_of_variable()
     monkeypatch.delenv(openenv.SETTINGS)
     assert "/ws" in {getattr(route, "path", "") for route in openenv.app_of_variable().routes}
+
+
+def test_the_folder_for_the_hub_is_one(tmp_path: Path) -> None:
+    openenv.write_hub_folder(tmp_path / "space")
+    _, issues = validate_multi_mode_deployment(tmp_path / "space")
+    assert issues == ["Missing uv.lock - run 'uv lock' to generate it"]
+    told = yaml.safe_load((tmp_path / "space" / "openenv.yaml").read_text())
+    assert (told["app"], told["port"]) == ("server.app:app", 8000)
+    with pytest.raises(ValueError, match="space"):
+        openenv.write_hub_folder(tmp_path / "space")

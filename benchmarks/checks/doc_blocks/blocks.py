@@ -61,7 +61,12 @@ class Block(Part):
 def pages(root: Path) -> tuple[Path, ...]:
     """The pages of a checkout that users read."""
     found = (root / "README.md", root / "CONTRIBUTING.md")
-    others = ("docs/*.md", "configs/*/README.md", "er_gym/tasks/data/*.md")
+    others = (
+        "docs/*.md",
+        "docs/integrations/*.md",
+        "configs/*/README.md",
+        "er_gym/tasks/data/*.md",
+    )
     return (*found, *(page for pattern in others for page in sorted(root.glob(pattern))))
 
 

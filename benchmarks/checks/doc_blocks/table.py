@@ -25,6 +25,10 @@ NEVER: Mapping[str, tuple[str, ...]] = {
         "docs/finetuning.md: pip install",
         "docs/ladder.md: pip install",
         "docs/learning.md: pip install",
+        "docs/integrations/mcp.md: python -m venv",
+        "docs/integrations/mcp.md: pip install",
+        "docs/integrations/openenv.md: python -m venv",
+        "docs/integrations/openenv.md: pip install",
         "docs/player.md: er-gym player install",
         "docs/player.md: er-gym player uninstall",
         "docs/serving.md: python -m venv",
@@ -74,6 +78,10 @@ NEVER: Mapping[str, tuple[str, ...]] = {
         "docs/tasks.md: er-gym tasks convert test_809.json",
         "docs/tasks.md: er-gym bench --tasks-file",
     ),
+    "needs OpenEnv, which the tests' own environment cannot have": (
+        "docs/integrations/openenv.md: er-gym openenv --hub-folder",
+        "docs/integrations/openenv.md: from er_gym.integrations.openenv",
+    ),
     "needs a GPU": ("docs/serving.md: CUDA_VISIBLE_DEVICES",),
     "needs a cluster": (
         "docs/cluster.md: er-gym",
@@ -83,6 +91,7 @@ NEVER: Mapping[str, tuple[str, ...]] = {
     ),
     "serves until it is ended": (
         "README.md: er-gym ui",
+        "docs/integrations/openenv.md: er-gym openenv --port",
         "docs/monitor.md: er-gym ui runs/ data/",
         "docs/monitor.md: er-gym ui --play",
         "docs/serving.md: er-gym match-server",
@@ -111,6 +120,7 @@ NEVER: Mapping[str, tuple[str, ...]] = {
         "docs/agents.md: run.json",
         "docs/agents.md: MODEL at",
         "docs/data.md: data/x/collection.json",
+        'docs/integrations/mcp.md: {"mcpServers"',
         "configs/dialects/README.md: user",
     ),
 }
