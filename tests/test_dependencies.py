@@ -56,7 +56,7 @@ MAY_USE = {
     "benchmarks/monitor": ("ui", "vlm"),
     "benchmarks/inspect_secrets.py": ("inspect",),
     "benchmarks/inspect_task.py": ("inspect",),
-    "benchmarks/perf": ("dev",),
+    "benchmarks/perf": ("dev", "openenv"),
     "benchmarks/checks": ("dev",),
     "benchmarks/pages": ("dev",),
     "examples": ("trl",),
@@ -71,6 +71,7 @@ NOT_OURS_TO_REQUIRE = {
     "pydantic_core": "the parser of pydantic, which always brings it",
     "trackio": "asked for by an option, whose error says what to install",
     "wandb": "asked for by a setting, whose error says what to install",
+    "websockets": "how OpenEnv talks, which always brings it",
 }
 
 USED_OTHERWISE = {

@@ -163,7 +163,7 @@ def make_app(
         ValueError: a setting is out of its range.
     """
     Session(**settings).close()  # refuses now what it would refuse at the first connection
-    app = create_fastapi_app(
+    app: FastAPI = create_fastapi_app(
         partial(EREnvironment, **settings),
         ERAction,
         ERObservation,

@@ -176,7 +176,10 @@ def test_doctor_has_a_line_for_each_part(er_gym, the_client, home):
             assert line[f"extra {name}"].endswith(f"; pip install 'er-gym[{name}]'")
     for plug in PLUGS:
         problems = ", ".join(lacks(plug))
-        assert line[f"plug {plug.name}"].startswith(f"--  {problems}; " if problems else "ok ")
+        assert line[f"plug {plug.name}"].startswith("--" if problems else "ok ")
+        assert (f"  {problems}; {plug.install}" if problems else plug.page) in line[
+            f"plug {plug.name}"
+        ]
 
 
 def test_doctor_tells_the_player_from_unity(er_gym, the_client):
