@@ -111,19 +111,16 @@ class Episodes:
             episode.session.close()
 
 
-def make_server(
-    episodes: Episodes | None = None, *, log_level: str = "ERROR", **settings: Any
-) -> MCPServer[Any]:
+def make_server(episodes: Episodes | None = None, **settings: Any) -> MCPServer[Any]:
     """The server.
 
     Args:
         episodes: what it plays in; by default new ones.
-        log_level: of the SDK, which writes to standard error.
         settings: of :class:`Episodes`, if none are given.
     """
     plays = Episodes(**settings) if episodes is None else episodes
     server: MCPServer[Any] = MCPServer(
-        "er-gym", version=__version__, instructions=INSTRUCTIONS, log_level=log_level
+        "er-gym", version=__version__, instructions=INSTRUCTIONS, log_level="ERROR"
     )
 
     def begin(seed: int | None = None, task_id: str = "", scene: str = "") -> CallToolResult:
