@@ -45,6 +45,7 @@ REPEATED = Sentence(
     "You have tried to {action} {times} times in a row, so the episode ends.",
     "你已经连续 {times} 次尝试 {action}，所以这一回合结束。",
 )
+NO_HINT = Sentence("That did not work.", "没有成功。")
 SAY = Sentence(
     "Say one of: {alone}; or one of {others} with an object type, such as 'navigate to Fridge'.",
     "请说其中之一：{alone}；或者 {others} 之一加上物体类型，例如 'navigate to Fridge'。",

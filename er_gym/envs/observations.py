@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from er_gym.envs.actions import Action
 from er_gym.envs.arguments import short_repr
 from er_gym.envs.asked_goal import GOAL_VERBS, goal, goal_row
+from er_gym.envs.feedback_words import NO_HINT
 from er_gym.envs.legality import AvailableObjects, KnownTypes
 from er_gym.envs.object_view import FEATURES as OBJECT_FEATURES
 from er_gym.envs.object_view import object_features
@@ -309,7 +310,6 @@ TEXTS = ("text_task", "text_caption", "text_targets", "text")
 - ``text_targets``: what it may navigate to, and what is within reach;
 - ``text``: why an action did not work.
 """
-_NO_HINT = "That did not work."
 
 
 def text_of(situation: Situation, kind: str = TEXTS[-1]) -> str:
@@ -319,7 +319,7 @@ def text_of(situation: Situation, kind: str = TEXTS[-1]) -> str:
     lines = [
         f"Task: {situation.instruction}",
         f"Step {situation.steps} of {situation.max_steps}. "
-        f"{situation.feedback if hinted else _NO_HINT}",
+        f"{situation.feedback if hinted else NO_HINT()}",
     ]
     if much >= TEXTS.index("text_caption"):
         lines += [
