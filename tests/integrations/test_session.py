@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from er_gym.envs.errors import ResetNeeded
+from er_gym.envs.observations import STATE_LAYOUT
 from er_gym.integrations.scaffold import OBSERVATIONS, REWARDS, Scaffold
-from er_gym.integrations.session import PROMPT, Session, Turn, action_in
+from er_gym.integrations.session import PROMPT, Session, Turn, _anchor, action_in
 
 TASK = "FloorPlan2-single_pickup_from_closerep-Lettuce"
 SOLVE = ("navigate to Fridge", "open Fridge", "pickup Lettuce", "close Fridge", "end")
@@ -126,6 +127,19 @@ def test_anchors_tell_situations_apart_and_not_ways(make: Make) -> None:
     assert short[1].anchor == long[3].anchor != long[0].anchor
     assert long[4].anchor != long[3].anchor
     assert session.reset("FloorPlan2-710812-single_search-Apple").anchor != short[0].anchor
+
+
+@pytest.mark.parametrize(
+    ("entry", "counts"),
+    [("right", True), ("cos", True), ("seen:Mug", True), ("on:DeskLamp", True), ("held:Mug", True)]
+    + [("steps", False), ("repeats", False), ("last open", False), ("did open:Fridge", False)],
+)
+def test_what_an_anchor_is_made_of(entry: str, counts: bool) -> None:
+    state = np.zeros(len(STATE_LAYOUT), np.float32)
+    before = _anchor("a task", state)
+    state[STATE_LAYOUT.index(entry)] = 0.5
+    assert (_anchor("a task", state) != before) == counts
+    assert _anchor("another", state).startswith("another#")
 
 
 @pytest.mark.parametrize(
