@@ -26,7 +26,7 @@ from pydantic import Field
 
 from er_gym.envs.errors import ResetNeeded
 from er_gym.integrations.session import Session, Turn, png
-from er_gym.tasks.suites import config_directory
+from er_gym.tasks.config_folder import config_directory
 from er_gym.version import __version__
 from er_gym.writing.folders import whole_folder
 

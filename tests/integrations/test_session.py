@@ -131,8 +131,10 @@ def test_anchors_tell_situations_apart_and_not_ways(make: Make) -> None:
 
 @pytest.mark.parametrize(
     ("entry", "counts"),
-    [("right", True), ("cos", True), ("seen:Mug", True), ("on:DeskLamp", True), ("held:Mug", True)]
-    + [("steps", False), ("repeats", False), ("last open", False), ("did open:Fridge", False)],
+    [
+        *((name, True) for name in ("right", "cos", "seen:Mug", "on:DeskLamp", "held:Mug")),
+        *((name, False) for name in ("steps", "repeats", "last open", "did open:Fridge")),
+    ],
 )
 def test_what_an_anchor_is_made_of(entry: str, counts: bool) -> None:
     state = np.zeros(len(STATE_LAYOUT), np.float32)
