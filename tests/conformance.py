@@ -63,6 +63,11 @@ class Player(Protocol):
     def step(self, text: str) -> Answer: ...
 
 
+def reply(text: str) -> str:
+    """A model's reply whose action is a text, in a tag that no text of the courses has."""
+    return f"<think>Hm.</think><DecisionMaking>{text}</DecisionMaking>"
+
+
 def differences(player: Player, courses: Sequence[Course]) -> list[str]:
     """Where a plug answers otherwise than ``gymnasium.make``: a line for each course's first."""
     found = []

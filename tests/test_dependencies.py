@@ -28,6 +28,15 @@ MAY_USE = {
     "er_gym/data/exports": ("data", "minari"),
     "er_gym/integrations/mcp.py": ("mcp",),
     "er_gym/integrations/openenv.py": ("openenv",),
+    "er_gym/integrations/minari.py": ("minari",),
+    "er_gym/integrations/ms_swift.py": ("ms-swift",),
+    "er_gym/integrations/nemo_gym.py": ("nemo-gym",),
+    "er_gym/integrations/rllib.py": ("rllib",),
+    "er_gym/integrations/skyrl_gym.py": ("skyrl-gym",),
+    "er_gym/integrations/trl.py": ("trl",),
+    "er_gym/integrations/trl_text.py": ("trl",),
+    "er_gym/integrations/verifiers.py": ("verifiers",),
+    "er_gym/integrations/verl.py": ("verl",),
     "agents": (),
     "agents/finetune": ("finetune",),
     "agents/finetune/gguf_model.py": ("finetune", "gguf"),
@@ -59,8 +68,8 @@ MAY_USE = {
     "benchmarks/perf": ("dev", "openenv"),
     "benchmarks/checks": ("dev",),
     "benchmarks/pages": ("dev",),
-    "examples": ("trl",),
-    "tests": ("dev", "inspect", "openenv"),
+    "examples": ("rl",),
+    "tests": ("dev", "inspect", "nemo-gym", "openenv", "skyrl-gym", "verifiers"),
 }
 """Folder or file to the extras whose packages it may import, besides the core's; the longest that
 fits counts."""
@@ -121,7 +130,11 @@ def third_party(path: Path) -> set[str]:
     return {name.partition(".")[0] for name in names} - IGNORED
 
 
-NAMED_OTHERWISE = {"openenv": ["openenv-core"]}
+NAMED_OTHERWISE = {
+    "openenv": ["openenv-core"],
+    "resources_servers": ["nemo-gym"],
+    "swift": ["ms-swift"],
+}
 """What a package belongs to, where that is not installed."""
 
 

@@ -24,7 +24,7 @@ from benchmarks.cli.extras import extras
 from benchmarks.harness.output import ROOT
 from benchmarks.harness.tally import end
 
-_BY_THEMSELVES = ("openenv",)
+_BY_THEMSELVES = ("ms-swift", "nemo-gym", "openenv", "rllib", "skyrl-gym", "verifiers", "verl")
 """The extras that do not go with constraints.txt; pyproject.toml says why."""
 _TRIED = "charts,ui,vlm"
 """The extras of the commands that are tried."""

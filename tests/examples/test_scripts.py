@@ -33,7 +33,7 @@ SHORT = (
     "trajectories",
 )
 """The scripts for what one does first; the others connect er-gym to other programs."""
-OTHERS = ("ai2thor_tutorial", "grpo_text")
+OTHERS = ("ai2thor_tutorial",)
 
 
 @pytest.fixture
