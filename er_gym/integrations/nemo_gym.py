@@ -1,6 +1,6 @@
 """NeMo Gym: a resources server whose sessions are household episodes, for its ``gymnasium_agent``.
 
-The file is the ``entrypoint`` of a server's configuration, which docs/integrations/nemo_gym.md has.
+The file is the ``entrypoint`` of a server's configuration, which docs/integrations/nemo-gym.md has.
 """
 
 from __future__ import annotations

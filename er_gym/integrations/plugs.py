@@ -139,7 +139,7 @@ PLUGS: tuple[Plug, ...] = (
         name="verl",
         title="verl",
         module="er_gym.integrations.verl",
-        requires=("verl>=0.9; python_version < '3.13'",),
+        requires=("verl[verl-core]>=0.9; python_version < '3.13'",),
         tried="verl 0.9.1",
         page="docs/integrations/verl.md",
         extra="verl",
