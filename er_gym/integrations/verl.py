@@ -59,7 +59,8 @@ class HouseholdLoop(AgentLoopBase):
         ids = await self.ct_build_initial_tokens(messages)
         mask: list[int] = []
         logprobs: list[float] | None = None
-        request, replies, reward, extra = uuid4().hex, 0, 0.0, {}
+        request, replies, reward = uuid4().hex, 0, 0.0
+        extra: dict[str, Any] = {}
         while len(mask) < self._longest and not turn.done and replies < (self._most or 2**31):
             said = await self.server_manager.generate(
                 request_id=request, prompt_ids=ids, sampling_params=sampling_params
