@@ -24,7 +24,7 @@ NAME = "er-gym"
 Observed = dict[str, NDArray[np.float32]]
 
 
-class MaskedEnv(gymnasium.Wrapper[Observed, Any, dict[str, Any], Any]):
+class MaskedEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
     """An environment whose observation is ``observations``, a vector, and ``action_mask``.
 
     Args:
