@@ -225,10 +225,10 @@ def judge_answers(thought: Thought) -> Iterator[Verdict]:
         told = lexicon.told.search(span.text)
         if told is None or any(each.asks for each in span.clauses):
             continue
-        said = next((why for why, each in lexicon.answers.items() if each.search(span.text)), "")
+        said = [why for why, each in lexicon.answers.items() if each.search(span.text)]
         if not said:
             continue
-        meant = _meant(thought, span)
+        meant = _meant(thought, span, told.start())
         if meant is None:
             continue
         if not meant:
@@ -241,7 +241,7 @@ def judge_answers(thought: Thought) -> Iterator[Verdict]:
                     ),
                 )
             continue
-        fits = any(_answers(each, said) for each in meant)
+        fits = any(_answers(each, why) for each in meant for why in said)
         last = meant[-1]
         yield Verdict(
             span.sentence,
@@ -255,11 +255,15 @@ def _quoted(each: LastAction) -> str:
     return each.feedback.split(".")[0].split(" There is")[0] or "none"
 
 
-def _meant(thought: Thought, span: Span) -> list[LastAction] | None:
-    """The actions that a sentence speaks of; None if that is open."""
+def _meant(thought: Thought, span: Span, told: int) -> list[LastAction] | None:
+    """The actions that a sentence speaks of; None if that is open.
+
+    What stands before the answer is what it was given to.
+    """
     lexicon = lexicon_of(thought)
+    named = span.among(0, told) or span.mentions
     said = {verb for verb, phrase in lexicon.plain_verbs.items() if phrase.search(span.text)}
-    types = all_interchangeable(each for mention in span.mentions for each in mention.types)
+    types = all_interchangeable(each for mention in named for each in mention.types)
     if not types:
         return None
     of_things = [each for each in thought.known.actions if each.action.object_type in types]

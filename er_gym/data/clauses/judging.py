@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from er_gym.data.action_claims import decided
-from er_gym.data.clauses import deeds, measures, sights, states
+from er_gym.data.clauses import deeds, measures, reasons, sights, states
 from er_gym.data.clauses.reading import Verdict
 from er_gym.data.thought import Refusal, Thought
 
@@ -26,6 +26,12 @@ JUDGES: tuple[Callable[[Thought], Iterator[Verdict]], ...] = (
     measures.judge_distances,
     measures.judge_rooms,
     measures.judge_tasks,
+    reasons.judge_purposes,
+    reasons.judge_losses,
+    reasons.judge_failures,
+    reasons.judge_untouched,
+    reasons.judge_turned_down,
+    reasons.judge_own_words,
 )
 """Every reader of claims."""
 

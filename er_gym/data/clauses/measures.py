@@ -70,7 +70,9 @@ def _counted(
     sides = {side for side, phrase in thought.phrases.sides.items() if phrase.search(clause.text)}
     if sides:
         those = [each for each in those if each.side in sides]
-    others = {each for other in span.mentions if other is not mention for each in other.types}
+    others = all_interchangeable(
+        each for other in span.mentions if other is not mention for each in other.types
+    )
     return [each for each in those if each.on in others] or those
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from er_gym.data.claims import is_given, is_placing, not_on
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, is_told, lexicon_of, sentences_of
 from er_gym.data.mentions import Mention, all_interchangeable
+from er_gym.data.remembered import BELIEVED
 from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.tasks import verbs
 from er_gym.thor import OBJECT_TYPES
@@ -154,6 +155,8 @@ def judge_guesses(thought: Thought) -> Iterator[Verdict]:
     lexicon = lexicon_of(thought)
     for clause, span in clauses_of(thought):
         if not clause.hedged or clause.asks or clause.conditional or clause.intended:
+            continue
+        if BELIEVED[thought.known.language].search(clause.text):
             continue
         if clause.usual or clause.negated or lexicon.another.search(clause.text):
             continue

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 
 from er_gym.data.claims import is_placing, not_on, subjects, told_to_be_on
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, is_told, lexicon_of
-from er_gym.data.mentions import Mention
+from er_gym.data.mentions import Mention, all_interchangeable
 from er_gym.data.thought import Refusal, Thought, name_of
+from er_gym.tasks import verbs
 
 STATES: Mapping[str, tuple[bool, tuple[str, ...]]] = {
     "open": (True, ("open",)),
@@ -40,6 +42,8 @@ def judge_states(thought: Thought) -> Iterator[Verdict]:
             none = lexicon.none_of.search(before)
             if not none and phrases.negation.search(before):
                 continue
+            if _is_to_be(thought, mention, match):
+                continue
             if lexicon.state_since.match(clause.text, match.end()):
                 continue
             said = match.groupdict()
@@ -49,6 +53,16 @@ def judge_states(thought: Thought) -> Iterator[Verdict]:
         runs_from = span.named(poured, "x") if poured else None
         if runs_from is not None and not clause.negated:
             yield _state(thought, span, runs_from, "on", False)
+
+
+def _is_to_be(thought: Thought, mention: Mention, match: re.Match[str]) -> bool:
+    """Whether "with the drawer closed" tells what is so after the next action."""
+    decision = thought.known.decision
+    return (
+        match.group().startswith("with ")
+        and decision.verb in (verbs.OPEN, verbs.CLOSE, verbs.TOGGLE)
+        and decision.object_type in all_interchangeable(mention.types)
+    )
 
 
 def _state(thought: Thought, span: Span, mention: Mention, word: str, negated: bool) -> Verdict:
