@@ -114,7 +114,9 @@ def told_to_be_on(thought: Thought) -> Iterator[tuple[Clause, Mention, Mention]]
                     yield clause, mention, holder
 
 
-_SAYS_SO = re.compile(r"\b(?:[a-z]+s|[a-z]+ing|are|lie|sit|stand|rest|was|were|been|left|put)\b|'s\b|[在有着是]")
+_SAYS_SO = re.compile(
+    r"\b(?:[a-z]+s|[a-z]+ing|are|lie|sit|stand|rest|was|were|been|left|put)\b|'s\b|[在有着是]"
+)
 _ELSEWHERE = re.compile(
     r"\b(?:goes|go|belongs?|has to|have to|needs?|put|should|must|wants?|wanted|after|before)\b"
 )

@@ -84,7 +84,9 @@ _RECALLS: Mapping[Language, re.Pattern[str]] = {
 }
 """Words of one who remembers."""
 BELIEVED: Mapping[Language, re.Pattern[str]] = {
-    "en": re.compile(r"\bi(?:'d| had)? (?:thought|expected|assumed|figured|hoped|imagined|believed)\b"),
+    "en": re.compile(
+        r"\bi(?:'d| had)? (?:thought|expected|assumed|figured|hoped|imagined|believed)\b"
+    ),
     "zh": re.compile(r"原以为|本以为|还以为|以为"),
 }
 """A belief that has been given up: "I thought that it would be there"."""
@@ -110,7 +112,8 @@ _PLACE: Mapping[Language, re.Pattern[str]] = {
 """Words for a place that has no name."""
 _SOMETHING_ELSE: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(
-        r"\breach\b|\bbecause\b|\b(?:as soon as|once) i\b|\bi was asked\b|\bit should be\b|\b(?:needn't|need not|no need)\b"
+        r"\breach\b|\bbecause\b|\b(?:as soon as|once) i\b|\bi was asked\b|\bit should be\b"
+        r"|\b(?:needn't|need not|no need)\b"
     ),
     "zh": re.compile(r"够|拿到|拿在手|任务|不用|不必|不需要|没必要"),
 }

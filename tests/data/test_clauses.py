@@ -6,10 +6,8 @@ from dataclasses import replace
 
 from support import in_one_test
 
-from er_gym.data.clauses.judging import unknown_sentences
-from er_gym.data.critic import check
+from er_gym.data.critic import check, review
 from er_gym.data.knowledge import Knowledge, LastAction
-from er_gym.data.thought import Thought
 from er_gym.data.trajectory import SeenObject, Subgoal
 from er_gym.envs.actions import Action
 
@@ -148,8 +146,11 @@ def test_true_claims_stand(text: str) -> None:
 
 
 def test_sentences_without_a_claim_are_counted_as_unknown() -> None:
-    thought = Thought("How dull. The faucet is off.", "reasoning", LIMIT, KITCHEN)
-    assert unknown_sentences(thought) == (1, 2)
+    found = review("How dull. The faucet is off.", "reasoning", KITCHEN, limit=LIMIT)
+    assert (found.true, found.false, found.unknown) == (1, 0, 1)
+    assert found.open == ("How dull.",)
+    lie = review("How dull. The faucet is on.", "reasoning", KITCHEN, limit=LIMIT)
+    assert (lie.true, lie.false, lie.unknown) == (0, 1, 1)
 
 
 @in_one_test(

@@ -40,7 +40,7 @@ def judge_deeds(thought: Thought) -> Iterator[Verdict]:
         )
         for verb, phrases in lexicon.deeds.items():
             group = "y" if verb == verbs.PUT else "x"
-            for match in span.matches(phrases):
+            for match in span.matches_of(phrases, thought.phrases.of_other):
                 mention = span.named(match, group)
                 if mention is None:
                     continue

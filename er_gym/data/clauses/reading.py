@@ -54,6 +54,17 @@ class Span:
             return None
         return self.first(match.start(group), match.end(group))
 
+    def matches_of(self, phrases: Iterable[Words], of_other: Words) -> Iterator[re.Match[str]]:
+        """Every match of some phrases but those that begin with the place of another thing.
+
+        "The egg from the fridge is in my hand" tells nothing of the fridge.
+        """
+        for match in self.matches(phrases):
+            before = self.text[: match.start()]
+            begins = self.text[match.start() : match.start() + 1] == MARK
+            if not (begins and MARK in before and of_other.search(before)):
+                yield match
+
     def first(self, start: int, end: int) -> Mention | None:
         """The first name in a part of the text."""
         return next(iter(self.among(start, end)), None)

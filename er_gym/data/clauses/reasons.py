@@ -33,14 +33,13 @@ def judge_purposes(thought: Thought) -> Iterator[Verdict]:
             if place is None and not words.reason.search(span.text):
                 continue
             places = place.types if place else all_interchangeable(own)
+            settled = len(pairs) == 1 or any(
+                thing.types & all_interchangeable([each]) for each, _ in pairs
+            )
             wrong = (
                 not thing.types & asked
                 or not places & asked
-                or len(pairs) == 1
-                and not _is_pair(thing.types, places, pairs)
-                or bool(pairs)
-                and any(thing.types & all_interchangeable([each]) for each, _ in pairs)
-                and not _is_pair(thing.types, places, pairs)
+                or (settled and not _is_pair(thing.types, places, pairs))
             )
             refusal = Refusal(
                 "task", f"The task says: “{known.instruction}”; it does not want that."
@@ -82,12 +81,12 @@ def judge_losses(thought: Thought) -> Iterator[Verdict]:
     for clause, span in clauses_of(thought):
         if _is_open(clause):
             continue
-        for match in span.matches(words.missing):
+        for match in span.matches_of(words.missing, thought.phrases.of_other):
             mention = span.named(match, "x")
             if mention is not None and not clause.past and mention.types & thought.held:
                 refusal = Refusal("held", f"{name_of(mention)} is in the hand: it was found.")
                 yield Verdict(span.sentence, refusal)
-        for match in span.matches(words.dropped):
+        for match in span.matches_of(words.dropped, thought.phrases.of_other):
             mention = span.named(match, "x")
             if mention is None or clause.negated:
                 continue
@@ -110,15 +109,15 @@ def judge_failures(thought: Thought) -> Iterator[Verdict]:
     for clause, span in clauses_of(thought):
         if _is_open(clause) or clause.intended:
             continue
-        for match in span.matches(words.easily):
+        for match in span.matches_of(words.easily, thought.phrases.of_other):
             if thought.phrases.negation.search(
                 _without(match.group(), ("without",)), 0
             ) or thought.phrases.negation.search(clause.text[: match.start()]):
                 continue
-            for mention in _listed(span, match.start("x")):
-                tries = _tries(thought, verbs.PICKUP, mention)
+            for taken in _listed(span, match.start("x")):
+                tries = _tries(thought, verbs.PICKUP, taken)
                 easy = bool(tries) and tries[0]
-                refusal = Refusal("history", f"{name_of(mention)} was not taken at the first try.")
+                refusal = Refusal("history", f"{name_of(taken)} was not taken at the first try.")
                 yield Verdict(span.sentence, None if easy else refusal)
         for match in span.matches(words.failed_with):
             mention = span.named(match, "x")

@@ -31,7 +31,7 @@ def judge_states(thought: Thought) -> Iterator[Verdict]:
             continue
         claims = [
             (mention, match)
-            for match in span.matches((*lexicon.states, *phrases.states))
+            for match in span.matches_of((*lexicon.states, *phrases.states), phrases.of_other)
             if (mention := span.named(match, "x"))
         ]
         of_it = phrases.it_states.search(clause.text) if clause.it else None
@@ -98,7 +98,7 @@ def judge_hand(thought: Thought) -> Iterator[Verdict]:
         if empty and not clause.intended and not lexicon.at_times.search(clause.text):
             refusal = Refusal("held", f"The hand is not empty: {truth}.")
             yield Verdict(span.sentence, refusal if held else None)
-        for match in span.matches((*lexicon.held, *phrases.held)):
+        for match in span.matches_of((*lexicon.held, *phrases.held), phrases.of_other):
             senses = (phrases.negation, phrases.intention, phrases.goal, lexicon.at_times)
             if any(clause.says_before(sense, match.end()) for sense in senses):
                 continue
@@ -124,20 +124,20 @@ def judge_hand(thought: Thought) -> Iterator[Verdict]:
 def judge_supports(thought: Thought) -> Iterator[Verdict]:
     """A thing in view lies on another."""
     lexicon, phrases = lexicon_of(thought), thought.phrases
-    claims = [(clause.sentence, *those) for clause, *those in told_to_be_on(thought)]
+    claims = [(clause.sentence, thing, holder) for clause, thing, holder in told_to_be_on(thought)]
     for clause, span in clauses_of(thought):
         if not clause.is_fact or (clause.past and "was left" not in clause.text):
             continue
         for match in span.matches(lexicon.lies_on):
-            mention, holder = span.named(match, "x"), span.named(match, "y")
-            if mention and holder and not is_placing(clause, match.start("x"), phrases):
-                claims.append((span.sentence, mention, holder))
-    for sentence, mention, holder in claims:
-        wrong = not_on(thought, mention, holder)
+            mention, under = span.named(match, "x"), span.named(match, "y")
+            if mention and under and not is_placing(clause, match.start("x"), phrases):
+                claims.append((span.sentence, mention, under))
+    for sentence, thing, holder in claims:
+        wrong = not_on(thought, thing, holder)
         if wrong:
             refusal = Refusal(
-                "support", f"{name_of(mention)} is not in or on {name_of(holder)}: {wrong}."
+                "support", f"{name_of(thing)} is not in or on {name_of(holder)}: {wrong}."
             )
             yield Verdict(sentence, refusal)
-        elif any(True for _ in thought.things(mention.types)):
+        elif any(True for _ in thought.things(thing.types)):
             yield Verdict(sentence)
