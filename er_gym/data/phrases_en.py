@@ -107,7 +107,7 @@ PHRASES = Phrases(
         r"|n't\b|n’t\b"
     ),
     condition=_any(
-        r"\b(?:if|unless|in case|(?<!at )once(?! (?:before|already|more|again)\b|[,.;]|$)|until|as soon as|otherwise|before(?= [a-z])(?! (?:anything|everything|me|that|this|now|us|long)\b| (?:i|we) (?:[a-z]+ed|left|went|took|came|got|had|ever)\b| i'd\b)|provided|suppose|assuming"
+        r"\b(?:if|unless|in case|(?<!at )once(?! (?:before|already|more|again)\b|[,.;]|$)|until|as soon as|otherwise|before(?= [a-z])(?! (?:and|but|anything|everything|me|that|this|now|us|long)\b| (?:i|we) (?:[a-z]+ed|left|went|took|came|got|had|ever)\b| i'd\b)|provided|suppose|assuming"
         r"|even when|whenever|wherever|would have|in order to|so as to)\b|\bwhen (?!i (?:[a-z]+ed|was|stood|saw|went|got|came|took|had)\b)"
     ),
     goal=_any(

@@ -39,6 +39,8 @@ def judge_deeds(thought: Thought) -> Iterator[Verdict]:
             if each.sentence == clause.sentence
         )
         for verb, phrases in lexicon.deeds.items():
+            if not clause.mentions or not lexicon.deed_words[verb].search(clause.text):
+                continue
             group = "y" if verb == verbs.PUT else "x"
             for match in span.matches_of(phrases, thought.phrases.of_other):
                 mention = span.named(match, group)
@@ -99,7 +101,7 @@ def _deed(
         act == verbs.PICKUP and _failed(thought, act, mention)
     )
     # Places are gone to by their type; whatever else is done is done to one of several.
-    several = act != verbs.NAVIGATE and sum(1 for _ in thought.things(mention.types)) > 1
+    several = act != verbs.NAVIGATE and thought.are_several(mention.types)
     some = _OF_SOME.match(match.string, match.end())
     if (
         done

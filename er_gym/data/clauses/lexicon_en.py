@@ -78,6 +78,7 @@ LEXICON = Lexicon(
         verbs.PICKUP: (
             *_deed(_TOOK, "picking up|taking|grabbing|fetching|collecting|retrieving", "picked up|taken|grabbed|collected|fetched|retrieved"),
             re.compile(rf"(?:{_DONE}) (?:picked|took|taken|lifted|picking|pick) {_D}{_X}(?: right)? (?:up|away|out|along|with me)\b"),
+            re.compile(rf"(?:{_I}) got {_D}{_X}(?=$|[.;]| (?:earlier|before|already|from|out of|off)\b)"),
             re.compile(r"\b(?:managed|was able|did manage) to (?:pick up|take|grab|get hold of|get|fetch|collect) " + _D + _X),
             re.compile(rf"\b(?:grabbing|taking|picking up|getting|fetching|lifting|collecting) (?:hold of )?{_D}{_X} (?:was (?:easy|simple|no (?:trouble|problem|effort)|effortless|a breeze|quick|straightforward|a success)|worked(?! out badly)|went (?:well|fine|smoothly|through|off)|succeeded|posed no)"),
             re.compile(rf"\bsucceeded in (?:grabbing|taking|picking up|getting|fetching|lifting|collecting) (?:hold of )?{_D}{_X}"),
@@ -103,6 +104,15 @@ LEXICON = Lexicon(
             *_deed(_SEARCHED, "searching|checking|inspecting|examining|going through|looking (?:in|into|inside|through)|peering into", "searched|checked|examined|inspected|explored|ruled out"),
             re.compile(rf"\bmy (?:search|inspection|check) of {_D}{_X}"),
         ),
+    },
+    deed_words={
+        verbs.OPEN: re.compile(r"open|swung|flung|slid|unlatch|lift|rais|flip|popp"),
+        verbs.CLOSE: re.compile(r"clos|shut|slamm|got|push|pull|slid"),
+        verbs.PICKUP: re.compile(r"pick|tak|took|grab|got|fetch|collect|retriev|snatch|scoop|seiz|gather|gripp|laid|pluck|remov|c[ao]me|lift|get|lung|tr[yi]|attempt|reach"),
+        verbs.PUT: re.compile(r"plac|dropp|stow|laid|deposit|stor|toss|thr|deliver|shov|tuck|popp|mov|slipp|park|put|set|left"),
+        verbs.TOGGLE: re.compile(r"switch|turn|flick|flipp|toggl|power|shut"),
+        verbs.NAVIGATE: re.compile(r"gone|w[ea]n?t|been|walk|mov|travel|navig|return|head|run|hurr|step|roll|driv|drov|c[ao]me|got|popp|stopp|ma[kd]e|pa[iu]|visit|reach|approach|call|set|dropp|arriv|swung|go"),
+        "searched": re.compile(r"search|check|examin|inspect|explor|investig|comb|rummag|gone|went|been|go|sift|look|peer|peek|glanc|had|tak|took|pok|dug|stuck|rul|tri|cross"),
     },
     denied_deeds={
         verb: (
@@ -180,6 +190,7 @@ LEXICON = Lexicon(
         "living room": re.compile(r"\b(?:living[- ]room|lounge|sitting[- ]room|parlou?r)\b(?! §| chair)"),
         "other": re.compile(r"\b(?:garage|basement|attic|classroom|hallway|corridor|cellar|garden|laundry room|dining room|library|workshop)\b(?! §)"),
     },
+    any_room=re.compile(r"room|kitchen|pantry|galley|lavatory|bedchamber|dormitory|quarters|lounge|parlo|garage|basement|attic|hallway|corridor|cellar|garden|library|workshop"),
     room_in_general=re.compile(r"\b(?:another|other|next|most|any|every|different|usually|normally|typically|often|if|were|not|n't|than|instead|belongs?|rather|would be|outside|towards?|no)\b|\b(?:kitchen|bathroom|bedroom|living room)s\b"),
     states=(
         re.compile(rf"{_X}(?: doors?| lid| light)?(?: (?:(?:over )?(?:on|to|off to) (?:my|the) (?:left|right|side)|ahead|in front of me|here|there|itself|nearby))?(?: (?:is|are|hangs?|stands?|stays?|remains?|sits?)|'s|,? with its doors?)(?P<no>n't| not| no longer)?(?: (?:still|already|now|just|also|quite|both|all|currently|clearly|hanging|standing|lying|drawn|pulled|pushed|switched|turned|left|wide|fully|properly|tightly|firmly|brightly|swung|merrily|flung|half|left))* (?:(?P<open>open|ajar|agape|gaping|unlatched)|(?P<closed>shut|closed|sealed|drawn(?= |$|[,.;])(?! back| up| open))|(?P<on>on(?=$|[,.;]| and\b| but\b| again)|lit|burning|running|glowing|blazing|humming|alight|gushing|flowing|dripping|shining|whirring|boiling|brewing|playing)|(?P<off>off(?=$|[,.;]| and\b| but\b| again| now)|out(?=$|[,.;]| and\b)|dark|unlit))\b(?! by\b| up\b|-| to\b| in\b| out of\b)"),

@@ -152,7 +152,7 @@ def judge_rooms(thought: Thought) -> Iterator[Verdict]:
     if not possible:
         return
     for span in sentences_of(thought):
-        for room, phrase in lexicon.rooms.items():
+        for room, phrase in lexicon.rooms.items() if lexicon.any_room.search(span.text) else ():
             for match in phrase.finditer(span.text):
                 around = span.text[max(0, match.start() - _ROUND) : match.end() + _ROUND]
                 if lexicon.room_in_general.search(around) or match.group() in instruction:

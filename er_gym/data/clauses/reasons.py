@@ -165,7 +165,7 @@ def judge_untouched(thought: Thought) -> Iterator[Verdict]:
             continue
         for match in span.matches(words.untouched):
             mention = span.named(match, "x")
-            if mention is None or sum(1 for _ in thought.things(mention.types)) > 1:
+            if mention is None or thought.are_several(mention.types):
                 continue
             done = next((each for each in _TOUCHING if thought.done(each, mention.types)), "")
             refusal = Refusal("history", f"The agent did {done} {name_of(mention)} before.")
