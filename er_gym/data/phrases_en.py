@@ -148,7 +148,7 @@ PHRASES = Phrases(
             r"\b(?:see|sees|seeing|saw|spot|spotted|spots|notice|noticed|observe|observed|make out|catch sight of|caught sight of"
             r"|glimpse|glimpsed|recogni[sz]e|identify|discover|discovered|found|located|detect|looking (?:right )?at|staring at"
             r"|come across|came across|there is|there's|there are|here is|here's|here are|comes|that is|that's|this is|facing)"
-            rf" (?:that |both |also |now |clearly |already |right |here )*{_D}{_XS}(?! (?:shows|makes sense))"
+            rf" (?:that |both |also |now |clearly |already |right |here )*(?!(?:where|what|why|how|when) ){_D}{_XS}(?! (?:shows|makes sense))"
         ),
         re.compile(
             rf"{_XS}(?:,? (?:is|are|has|have|lies|lie|comes|stands|sits)|'s)(?: (?:{_HOW}|come|coming|been|immediately|plainly))*"

@@ -162,6 +162,8 @@ _PAST = re.compile(
 )
 
 
+_ROUTE = re.compile(r"\b(?:that was|how i|was how|my route|was the order|how it went)\b")
+"""It tells of a course that was taken."""
 _SAYS_WHEN = re.compile(
     r"\b(?:first|before|after|afterwards?|then|later|subsequently)\b|[先后]|之前|以前"
 )
@@ -179,8 +181,9 @@ def judge_order(thought: Thought) -> Iterator[Verdict]:
             continue
         for match in span.matches(lexicon.order):
             parts = (match["a"], match["b"])
-            if any(lexicon.planned.search(part) for part in parts) or not all(
-                _PAST.search(part) or lexicon.failing.search(part) for part in (match.group(),)
+            past = _PAST.search(match.group()) or _ROUTE.search(span.text)
+            if any(lexicon.planned.search(part) for part in parts) or not (
+                past or lexicon.failing.search(match.group())
             ):
                 continue
             first, then = (_turns(thought, span, match, group) for group in "ab")

@@ -119,9 +119,9 @@ def judge_failures(thought: Thought) -> Iterator[Verdict]:
                 easy = bool(tries) and tries[0]
                 refusal = Refusal("history", f"{name_of(taken)} was not taken at the first try.")
                 yield Verdict(span.sentence, None if easy else refusal)
-        for match in span.matches(words.failed_with):
+        for match in span.matches_of(words.failed_with, thought.phrases.of_other):
             mention = span.named(match, "x")
-            if mention is None or thought.phrases.of_other.search(clause.text[: match.start("x")]):
+            if mention is None:
                 continue
             wanted = all_interchangeable(mention.types)
             fits = any(each.action.object_type in wanted for each in failed)
@@ -197,13 +197,14 @@ def judge_own_words(thought: Thought) -> Iterator[Verdict]:
     if not earlier or not all(earlier):
         return  # some thoughts are not known
     spoken: frozenset[str] | None = None
-    for clause, span in clauses_of(thought):
-        if clause.asks or clause.conditional:
+    for span in sentences_of(thought):
+        if any(each.asks or each.conditional for each in span.clauses):
             continue
         for phrases, thinks in ((words.own_words, True), (words.never_thought, False)):
             for match in span.matches(phrases):
                 mention = span.named(match, "x")
-                if mention is None or (thinks and clause.negated):
+                denied = thought.phrases.negation.search(match.group())
+                if mention is None or (thinks and denied):
                     continue
                 if spoken is None:
                     spoken = _spoken_of(thought)
