@@ -19,9 +19,7 @@ from pathlib import Path
 import click
 
 from benchmarks.harness.judged_thoughts import HONEST, LIMIT, Judged, judge, load
-from er_gym.data.clauses.judging import unknown_sentences
-from er_gym.data.critic import check
-from er_gym.data.thought import Thought
+from er_gym.data.critic import check, review
 
 _LANGUAGES = ("en", "zh")
 _ROUNDS = 5
@@ -51,11 +49,9 @@ def _rows(judged: Iterable[Judged]) -> Iterator[str]:
 
 def _unknown(judged: Sequence[Judged]) -> float:
     """The share of sentences of which the critic judged nothing."""
-    counts = [
-        unknown_sentences(Thought(each.written.text, "reasoning", LIMIT, each.known))
-        for each in judged
-    ]
-    return sum(unknown for unknown, _ in counts) / max(1, sum(every for _, every in counts))
+    found = [review(each.written.text, "reasoning", each.known, limit=LIMIT) for each in judged]
+    unknown = sum(each.unknown for each in found)
+    return unknown / max(1, unknown + sum(each.true + each.false for each in found))
 
 
 def _microseconds(judged: Sequence[Judged]) -> float:

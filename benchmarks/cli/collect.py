@@ -127,7 +127,7 @@ def collect(
             executor_options.workforce(
                 shown.say, processors(), agents=[options.writer]
             ) as workforce,
-            _players(model, make_writer, out, shown.say) as (players, cost),
+            _players(model, make_writer, out, shown.say) as (players, cost, read),
         ):
             if selection is not None:
                 for each in selection.runs:
@@ -169,6 +169,8 @@ def collect(
         return code
     if bill:
         console.print(str(bill))
+    if reading := read():
+        console.print(reading, soft_wrap=True)
     console.print(_in_words(summary, out / TRAJECTORIES), soft_wrap=True)
     if selection is not None:
         from benchmarks.scoring.tables import print_tables
@@ -200,12 +202,12 @@ def _make_writer(name: str) -> NamedWriter:
 @contextmanager
 def _players(
     model: ExpertRun | None, make_writer: NamedWriter, out: Path, say: Callable[[object], None]
-) -> Iterator[tuple[Players, Callable[[], Cost | None]]]:
-    """Who plays, and a function that says what that has cost."""
+) -> Iterator[tuple[Players, Callable[[], Cost | None], Callable[[], str]]]:
+    """Who plays, and functions that say what that has cost, and what the critic has read."""
     if model is None:
         from agents.expert.players import Thinkers
 
-        yield Thinkers(make_writer), lambda: None
+        yield Thinkers(make_writer), lambda: None, str
         return
     with model.players(out, say) as ready:
         yield ready

@@ -16,6 +16,7 @@ from benchmarks.cli.vlm_options import VLMOptions
 
 if TYPE_CHECKING:
     from agents.expert.players import Players
+    from agents.expert.writers.reader import Critic
     from benchmarks.vlm_run import VLMRun
     from er_gym.data.trajectory import Language
     from er_gym.rollout.events import Cost
@@ -55,6 +56,13 @@ class ExpertOptions(OptionGroup):
         "critic accepts.",
     )
 
+    critic: str | None = option(
+        type=Words(),
+        metavar="CLIENT:MODEL",
+        help="With --expert: a model that checks what the critic's rules leave open in the "
+        "thoughts: openai:MODEL, hf:PATH. Settings, servers and budget are those of --expert.",
+    )
+
     @property
     def decides(self) -> bool:
         """Whether the model decides every action."""
@@ -91,6 +99,8 @@ class ExpertRun:
         from agents.vlm.clients.registry import resolve_client
 
         kind, _ = resolve_client(options.expert)
+        if options.critic is not None:
+            resolve_client(options.critic)
         _refuse_misfits(options, vlm, options.expert)
         if not options.decides:
             vlm = replace(vlm, agent_config=vlm.agent_config or _CONFIG)
@@ -122,6 +132,11 @@ class ExpertRun:
                 "strict_thoughts": options.strict_thoughts,
                 "settings": self.run.comparable_settings,
             }
+        if options.critic is not None:
+            from agents.expert.writers.reader import load_reader_prompts
+
+            reads = {"name": options.critic, "prompts_digest": load_reader_prompts().digest}
+            stated["critic"] = reads
         return {
             **stated,
             "places": options.places or "likely",
@@ -148,8 +163,8 @@ class ExpertRun:
     @contextmanager
     def players(
         self, directory: Path, say: Callable[[object], None]
-    ) -> Iterator[tuple[Players, Callable[[], Cost | None]]]:
-        """Who plays, and a function that says what that has cost.
+    ) -> Iterator[tuple[Players, Callable[[], Cost | None], Callable[[], str]]]:
+        """Who plays, and functions that say what that has cost, and what the critic has read.
 
         Args:
             directory: of the collection; it keeps replies and bills.
@@ -168,17 +183,37 @@ class ExpertRun:
                 from agents.expert.decider import Deciders
 
                 hint = options.hint == "plan"
-                players: Players = Deciders(asked, prompts, hint, options.strict_thoughts)
-            else:
-                players = self._thinkers(asked, prompts)
-            yield players, lambda: asked.cost
+                yield (
+                    Deciders(asked, prompts, hint, options.strict_thoughts),
+                    lambda: asked.cost,
+                    str,
+                )
+                return
+            critic = self._critic(asked)
+            yield (
+                self._thinkers(asked, prompts, critic),
+                lambda: asked.cost,
+                lambda: str(critic.counts),
+            )
 
-    def _thinkers(self, session: Any, prompts: Any) -> Players:
+    def _critic(self, session: Any) -> Critic:
+        from agents.expert.writers.reader import Critic, reader_settings
+        from er_gym.rollout.agent import CannotGoOn
+
+        name = self.options.critic
+        if name is None:
+            return Critic()
+        with bad_input(CannotGoOn):
+            return Critic(session.beside(name, reader_settings(self.run.settings)))
+
+    def _thinkers(self, session: Any, prompts: Any, critic: Critic) -> Players:
         from agents.expert.model_places import ModelPlaces
         from agents.expert.players import Thinkers
         from agents.expert.writers.model import ModelWriter
 
-        writer = ModelWriter(session.name, session.client, self.run.settings, prompts)
+        writer = ModelWriter(
+            session.name, session.client, self.run.settings, prompts, critic=critic
+        )
         if self.options.places == "model":
             # A prescreening does not know which places the model will name.
             return Thinkers(
@@ -193,6 +228,7 @@ def _refuse_without_model(options: ExpertOptions, vlm: VLMOptions) -> None:
     given = [
         *(["--places model"] if options.places == "model" else ()),
         *(["--decisions model"] if options.decides else ()),
+        *([f"--critic {options.critic}"] if options.critic else ()),
         *(flag for flag in options.given if flag in ("--hint", "--strict-thoughts")),
         *vlm.given,
     ]
@@ -204,6 +240,11 @@ def _refuse_misfits(options: ExpertOptions, vlm: VLMOptions, name: str) -> None:
     if options.decides:
         if options.places:
             raise BadInput("--places is for --decisions plan: a model that decides has no plan")
+        if options.critic:
+            raise BadInput(
+                "--critic is for --decisions plan; er-gym data verify --critic reads the thoughts "
+                "of a model that decides"
+            )
         return
     alone = [
         *([f"--hint {options.hint}"] if options.hint else ()),

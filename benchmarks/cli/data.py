@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 import click
 
 from benchmarks.cli.activity import doing
+from benchmarks.cli.data_critic import CriticOptions, read_thoughts, refuse_without_critic
 from benchmarks.cli.data_export import export
 from benchmarks.cli.data_frames import frames
 from benchmarks.cli.data_import import import_
 from benchmarks.cli.errors import CRASHED, BadInput, bad_input, print_problem
 from benchmarks.cli.executor import ExecutorOptions, processors, with_executor_options
-from benchmarks.cli.options import EXISTING_FILE, FILE, FOLDER, force_option
+from benchmarks.cli.options import EXISTING_FILE, FILE, FOLDER, force_option, with_options
 from benchmarks.cli.suites import suite_given
+from benchmarks.cli.vlm_options import VLMOptions
 from benchmarks.terminal import echo, stdout, terminal
 
 if TYPE_CHECKING:
@@ -86,6 +88,7 @@ def stats(collection: Path, layout: str, plots: Path | None, force: bool) -> Non
 )
 @click.option("--suite", help="The suite that was played, if it is package.module:Name.")
 @with_executor_options()
+@with_options(critic_options=CriticOptions, vlm_options=VLMOptions)
 def verify(
     collection: Path,
     pictures: bool,
@@ -93,6 +96,8 @@ def verify(
     tasks_file: Path | None,
     suite: str | None,
     executor_options: ExecutorOptions,
+    critic_options: CriticOptions,
+    vlm_options: VLMOptions,
 ) -> int:
     """Derive every field of every trajectory anew, and report every difference from the record.
 
@@ -112,6 +117,7 @@ def verify(
     from er_gym.rollout.worker_pool import WorkerSetupError
 
     with bad_input():
+        refuse_without_critic(critic_options, vlm_options)
         opened = _opened(collection)
         tasks = _tasks(opened, tasks_file, suite)
         doing(f"counting the trajectories of {collection}")
@@ -164,7 +170,35 @@ def verify(
             f"{totals.thoughts - totals.anew:,} thoughts were not written anew and compared, since "
             "a model or another program wrote them; the critic has read them."
         )
-    return CRASHED if totals.wrong else 0
+    if totals.sentences:
+        echo(
+            f"The critic's rules read a claim in {totals.sentences - totals.unread:,} of "
+            f"{totals.sentences:,} sentences; the others say nothing that they can check."
+        )
+    wrong = (
+        _read_by_model(opened, critic_options, vlm_options, limit) if critic_options.critic else 0
+    )
+    return CRASHED if totals.wrong or wrong else 0
+
+
+def _read_by_model(
+    collection: Collection, options: CriticOptions, vlm: VLMOptions, limit: int | None
+) -> int:
+    """Let a model read the thoughts; returns the number of its objections."""
+    from er_gym.rollout.agent import CannotGoOn
+
+    wrong = 0
+    try:
+        for name, said in read_thoughts(collection, options, vlm, limit, echo):
+            if not name:
+                echo(said)
+                continue
+            wrong += 1
+            if wrong <= _MOST_LINES:
+                print_problem(f"{name}: {said}")
+    except CannotGoOn as error:
+        raise BadInput(f"{error}; the same command goes on from the replies that it has") from error
+    return wrong
 
 
 @data.command()

@@ -106,10 +106,34 @@ def told_to_be_on(thought: Thought) -> Iterator[tuple[Clause, Mention, Mention]]
         if not clause.is_fact or clause.past:
             continue
         for match in _matches(clause, phrases.on):
+            if _is_gapped(thought, clause, match):
+                continue
             if not is_placing(clause, match.start("xs"), phrases):
                 (holder,) = clause.named(match, "y")
                 for mention in subjects(clause, match, phrases):
                     yield clause, mention, holder
+
+
+_SAYS_SO = re.compile(
+    r"\b(?:[a-z]+s|[a-z]+ing|are|lie|sit|stand|rest|was|were|been|left|put)\b|'s\b|[在有着是]"
+)
+_ELSEWHERE = re.compile(
+    r"\b(?:goes|go|belongs?|has to|have to|needs?|put|should|must|wants?|wanted|after|before)\b"
+)
+_ANY = re.compile(r"\b(?:a|an|one|some)(?: [a-z-]+)? $")
+
+
+def _is_gapped(thought: Thought, clause: Clause, match: re.Match[str]) -> bool:
+    """Whether "the pencil on the desk" has no verb, but may take one from before, or is a thought
+    of any pencil on any desk."""
+    first, last = match.span("xs"), match.span("y")
+    if last[0] < first[0] or _SAYS_SO.search(clause.text[first[1] : last[0]]):
+        return False
+    if _ANY.search(clause.text[: first[0]]) and _ANY.search(clause.text[: last[0]]):
+        return True
+    before = [each for each in thought.clauses if each.sentence == clause.sentence]
+    told = " ".join(each.text for each in before[: before.index(clause)])
+    return bool(_ELSEWHERE.search(f"{told} {clause.text[: first[0]]}"))
 
 
 def check_side(thought: Thought) -> Iterator[Refusal]:

@@ -58,7 +58,7 @@ _IS = (
     r"(?:is|are|'s|stays?|remains?|stands?|sits?|was left|has been left|have been left|has been"
     r"|have been|appears|looks)"
 )
-_GO = "off/on my way/headed/go/head/walk/move/navigate/travel/make my way/get/proceed/return/come/hurry/step"
+_GO = "off/on my way/headed/going/heading/walking/moving/running/go/head/walk/move/navigate/travel/make my way/get/proceed/return/come/hurry/step"
 _BEFORE_ACT = (
     r"(?: (?:now|first|next|then|just|simply|quickly|therefore|also|at once|immediately|directly"
     r"|try to|try and|go ahead and|start by|begin by|turn to|carefully|to|be|right away|instead"
@@ -107,7 +107,7 @@ PHRASES = Phrases(
         r"|n't\b|n’t\b"
     ),
     condition=_any(
-        r"\b(?:if|unless|in case|(?<!at )once(?! (?:before|already|more|again)\b|[,.;]|$)|until|as soon as|otherwise|before(?= [a-z])(?! (?:anything|everything|me|that|this|now|us|long)\b| (?:i|we) (?:[a-z]+ed|left|went|took|came|got|had|ever)\b| i'd\b)|provided|suppose|assuming"
+        r"\b(?:if|unless|in case|(?<!at )once(?! (?:before|already|more|again)\b|[,.;]|$)|until|as soon as|otherwise|before(?= [a-z])(?! (?:and|but|anything|everything|me|that|this|now|us|long)\b| (?:i|we) (?:[a-z]+ed|left|went|took|came|got|had|ever)\b| i'd\b)|provided|suppose|assuming"
         r"|even when|whenever|wherever|would have|in order to|so as to)\b|\bwhen (?!i (?:[a-z]+ed|was|stood|saw|went|got|came|took|had)\b)"
     ),
     goal=_any(
@@ -148,7 +148,7 @@ PHRASES = Phrases(
             r"\b(?:see|sees|seeing|saw|spot|spotted|spots|notice|noticed|observe|observed|make out|catch sight of|caught sight of"
             r"|glimpse|glimpsed|recogni[sz]e|identify|discover|discovered|found|located|detect|looking (?:right )?at|staring at"
             r"|come across|came across|there is|there's|there are|here is|here's|here are|comes|that is|that's|this is|facing)"
-            rf" (?:that |both |also |now |clearly |already |right |here )*{_D}{_XS}(?! (?:shows|makes sense))"
+            rf" (?:that |both |also |now |clearly |already |right |here )*(?!(?:where|what|why|how|when) ){_D}{_XS}(?! (?:shows|makes sense))"
         ),
         re.compile(
             rf"{_XS}(?:,? (?:is|are|has|have|lies|lie|comes|stands|sits)|'s)(?: (?:{_HOW}|come|coming|been|immediately|plainly))*"
@@ -267,14 +267,15 @@ PHRASES = Phrases(
         r"\b(?:fail|failed|fails|failure|unsuccessful|did not|didn't|not (?:work|succeed|go|budge|respond)|went wrong|could not|couldn't|unable|no effect|again|retry|once more|repeat|wrong|slipped|refused|did nothing|nothing happened|instead)\b"
     ),
     decides=_any(
-        r"\b(?:i|we)(?: will|'ll| shall| am going to| am about to| decide to| have decided to| choose to| intend to| plan to| am now going to| should| must| need to| have to| had better| want to| ought to| am ready to| would rather)\b",
-        r"\bi'(?:ll|m going to|m about to|ve decided to|d better|d rather)\b",
+        r"\b(?:i|we)(?: will|'ll| shall| am going to(?! (?:the|a|an|my|that|this|one|§))| am about to| decide to| have decided to| choose to| intend to| plan to| am now going to| should| must| need to| have to| had better| want to| ought to| am ready to| would rather)\b",
+        r"\bi'(?:ll|m going to(?! (?:the|a|an|my|that|this|one|§))|m about to|ve decided to|d better|d rather)\b",
         r"\bmade up my mind to\b|\blet me\b|\blet's\b|\blet us\b|\btime to\b|\bready to\b",
         r"\b(?:next|best|right|obvious|logical|sensible|first|immediate|remaining|only) (?:step|move|thing|action|option|choice|place|idea|course)[^.,§]{0,40}? (?:is|will be)(?: now)?(?: to)?\b",
         r"\bmakes? (?:the most |more |good |perfect )?sense to\b|\bmy (?:plan|decision|choice) is(?: now)? to\b|\bdecision is to\b|\bdecided(?: to|:)",
         r"\b(?:is|are) (?:what|where|the one) i(?:'ll| will|'m going to)(?= (?:open|go|take|head|close|pick|visit|try|check) )",
         r"\b(?:so|now|therefore|thus|hence|next|then|accordingly),? i(?= )",
-        r"\bi'm(?= (?:now )?(?:off|on my way|headed) to\b)",
+        r"\bi'm(?= (?:now )?(?:off|on my way|headed) to\b)|^(?:and |so |now |but )*(?=off to )",
+        r"\bi(?:'m| am)(?: now| just| simply| therefore)?(?= (?:going|heading|walking|moving|running|opening|pulling|closing|shutting|picking|grabbing|taking|fetching|putting|placing|dropping|setting|switching|turning)\b)",
         r"^i(?= (?:now |therefore |simply |then )?(?:go|head|walk|open|close|shut|pick|take|grab|place|switch|toggle|navigate|return|approach)\b)",
     ),
     before_act=re.compile(_BEFORE_ACT),
@@ -290,13 +291,14 @@ PHRASES = Phrases(
             "check/search/inspect/examine/investigate/explore/look/peek/take a look/take a closer look/have a look/have a closer look/see what is/rummage",
             rf"(?:(?:in|into|inside|at|on|under|behind|through|over|closely|around|out|more|once|again|beneath|next|what|is|near|by) )*{_D}{_X}",
         ),
-        "open": re.compile(rf"(?:open|open up|pull open) {_D}{_X}|(?:pull|swing|slide) {_D}(?P<x2>{MARK}) open"),
-        "close": _act("close|shut", _AND_SO),
-        "take": _act("pick up|pick|take out|take|grab|grasp|get|fetch|collect|lift|retrieve", _AND_SO),
+        "open": re.compile(rf"(?:opening|pulling open|open|open up|pull open) {_D}{_X}|(?:pulling|pull|swing|slide) {_D}(?P<x2>{MARK}) open"),
+        "close": _act("closing|shutting|close|shut", _AND_SO),
         "put": re.compile(
-            rf"(?:put|place|set|drop|leave|lay|deposit|store|insert|bring|carry|deliver|transport|take) (?:it|them|this|{_D}{MARK})(?: \w+)? (?:in|into|on|onto|to|inside|on top of|over to|down on) {_D}{_X}"
+            rf"(?:putting|placing|dropping|setting|put|place|set|drop|leave|lay|deposit|store|insert|bring|carry|deliver|transport) (?:it|them|this|{_D}{MARK})(?: \w+)? (?:in|into|on|onto|to|inside|on top of|over to|down on) {_D}{_X}"
+            rf"|(?:taking|take) (?:it|them|this|{_D}{MARK})(?: (?:back|along|over|straight|right))* (?:into|onto|to|over to) {_D}(?P<x2>{MARK})"
         ),
-        "toggle": re.compile(rf"(?:turn|switch|power|toggle|flip|press|activate|deactivate|light)(?: on| off)? {_D}{_X}"),
+        "take": _act("picking up|picking|taking out|taking|grabbing|fetching|pick up|pick|take out|take|grab|grasp|get|fetch|collect|lift|retrieve", _AND_SO),
+        "toggle": re.compile(rf"(?:turning|switching|turn|switch|power|toggle|flip|press|activate|deactivate|light)(?: on| off)? {_D}{_X}"),
         "slice": _act("slice|cut|chop", _AND_SO),
         "end": re.compile(r"(?:end|finish|stop(?! and\b)|conclude|wrap up|call it)(?: the task| here| now| it| this| there| my| everything| the)?\b"),
     },
@@ -313,7 +315,7 @@ PHRASES = Phrases(
         r"\b(?:the|this|that|your|given|provided|following) hints?\b(?! of\b)|\bhints? (?:says?|tells?|states?|mentions?|suggests?|given|provided|reads?)\b|\bkey actions?\b|\bground[- ]truth\b|\bdata ?sets?\b|\blanguage model\b|\ban ai\b|\bai (?:assistant|model)\b|\bas an? (?:large |ai|assistant|model)",
         r"\b(?:as|i was|i am|i've been|have been) (?:instructed|told|asked) to (?:justify|explain|write|give|provide|produce|respond|think of)\b|\bas instructed,|\bjustify (?:the|my|this) (?:decision|action|choice)",
         r"\b(?:provided|given|supplied|predetermined|intended|predefined|prescribed|expected) (?:decision|action|answer|list|plan|sequence|next (?:step|action))\b|\b(?:decision|action|list|answer|sequence)[^.]{0,30}(?:was|were|has been|have been|am|is) given (?:to me|here)\b|\blist[^.]{0,40}\bgiven\b",
-        r"\b(?:candidate|given|pending|navigable|provided|supplied|location) list\b|(?<!next )(?<!first )(?<!last )(?<!high )\b(?:on|in|from|per|following) the list\b|\bthe list (?:says|of|that|tells|given|shows|contains)|\bmetadata\b|\bsimulator\b|\bsystem prompt\b|\bthe prompt\b|\bword limit\b|\btraining data\b|\bannotat(?:ion|ed|or)",
+        r"\b(?:candidate|given|pending|navigable|provided|supplied|location) list\b|\b(?:(?:is|are|was|were|not|also|appears?|stands?) on|in|from|per|following) the list\b|\bthe list (?:says|of|that|tells|given|shows|contains)|\bmetadata\b|\bsimulator\b|\bsystem prompt\b|\bthe prompt\b|\bword limit\b|\btraining data\b|\bannotat(?:ion|ed|or)",
         r"\bi(?:'m| am) sorry,? (?:but )?i (?:can't|cannot|can not|am unable|won't)|\bi (?:cannot|can't|am unable to) (?:assist|help(?! (?:but\b|[a-z]+ing\b))|comply|fulfill|provide|process|view (?:the )?images)|\bcan(?:'t|not) (?:assist|help) with",
         r"\b(?:http|error|status)(?: code)?:? ?[45]\d\d\b|\b[45]\d\d (?:internal|bad|too many|service|gateway|forbidden|unauthori|not found|error)|\brate limit|\btoo many requests\b|\binternal server error\b|\btime(?:d)? ?out error\b|\btraceback\b|\bapi key\b|\bexception\b:|\bopenai\b|\bgpt-?\d|\brequest failed\b|\bconnection (?:error|refused|reset)|\binsufficient[_ ]quota|\bcontent policy\b",
     ),

@@ -64,6 +64,8 @@ def _remembers(known: Knowledge) -> bool:
 
 
 def _guesses(clause: Clause, language: Language) -> bool:
+    if BELIEVED[language].search(clause.text):
+        return False
     if _SOMETHING_ELSE[language].search(clause.text):
         return False
     place = len(clause.mentions) > 1 or _PLACE[language].search(clause.text)
@@ -81,6 +83,13 @@ _RECALLS: Mapping[Language, re.Pattern[str]] = {
     ),
 }
 """Words of one who remembers."""
+BELIEVED: Mapping[Language, re.Pattern[str]] = {
+    "en": re.compile(
+        r"\bi(?:'d| had)? (?:thought|expected|assumed|figured|hoped|imagined|believed)\b"
+    ),
+    "zh": re.compile(r"原以为|本以为|还以为|以为"),
+}
+"""A belief that has been given up: "I thought that it would be there"."""
 _MAY_BE: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(
         r"\b(?:(?:may|might|could|must)(?: well| still| also| just)* "
@@ -104,7 +113,8 @@ _PLACE: Mapping[Language, re.Pattern[str]] = {
 _SOMETHING_ELSE: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(
         r"\breach\b|\bbecause\b|\b(?:as soon as|once) i\b|\bi was asked\b|\bit should be\b"
+        r"|\b(?:needn't|need not|no need)\b"
     ),
-    "zh": re.compile(r"够|拿到|任务"),
+    "zh": re.compile(r"够|拿到|拿在手|任务|不用|不必|不需要|没必要"),
 }
 """Words for something else than where the thing is."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from er_gym.data.knowledge import Knowledge
 from er_gym.data.mentions import Mention, all_interchangeable, named_in
@@ -59,6 +60,11 @@ class Thought:
         return tuple(part for each in self.clauses for part in parts_of(each, self.phrases))
 
     @cached_property
+    def kept(self) -> dict[str, Any]:
+        """What its readers derive once, by their names for it."""
+        return {}
+
+    @cached_property
     def views(self) -> Mapping[str, Sequence[SeenObject]]:
         """The objects in view by direction, ``ahead`` being the agent's own."""
         return {"ahead": self.known.view, **self.known.views}
@@ -100,6 +106,10 @@ class Thought:
             for each in view:
                 if each.type in wanted:
                     yield direction, each
+
+    def are_several(self, types: Iterable[str]) -> bool:
+        """Whether several objects of some types are in view; one may be in two views."""
+        return len({(each.type, each.distance) for _, each in self.things(types)}) > 1
 
     def done(self, verb: str, types: frozenset[str]) -> bool:
         """Whether the agent did that to one of some types."""

@@ -50,6 +50,8 @@ class Verdict:
         turns, pictures, thoughts: how many were compared or checked.
         anew: how many of the thoughts were written anew and compared, too; the others are only
             checked by the critic.
+        sentences, unread: how many sentences the thoughts have, and in how many of them the
+            critic's rules read no claim.
     """
 
     id: str
@@ -58,6 +60,8 @@ class Verdict:
     pictures: int = 0
     thoughts: int = 0
     anew: int = 0
+    sentences: int = 0
+    unread: int = 0
 
 
 @dataclass
@@ -65,7 +69,8 @@ class Totals:
     """Sums of verdicts.
 
     Attributes:
-        trajectories, turns, pictures, thoughts, anew: how many were checked.
+        trajectories, turns, pictures, thoughts, anew, sentences, unread: how many there were, as
+            verdicts have them.
         wrong: how many trajectories have problems.
     """
 
@@ -74,6 +79,8 @@ class Totals:
     pictures: int = 0
     thoughts: int = 0
     anew: int = 0
+    sentences: int = 0
+    unread: int = 0
     wrong: int = 0
 
     def add(self, verdict: Verdict) -> None:
@@ -83,6 +90,8 @@ class Totals:
         self.pictures += verdict.pictures
         self.thoughts += verdict.thoughts
         self.anew += verdict.anew
+        self.sentences += verdict.sentences
+        self.unread += verdict.unread
         self.wrong += bool(verdict.problems)
 
 
@@ -142,7 +151,9 @@ def verify(
 
 
 def thought_problems(
-    trajectory: Trajectory, limits: Mapping[str, int] | None = None
+    trajectory: Trajectory,
+    limits: Mapping[str, int] | None = None,
+    read: Counter[str] | None = None,
 ) -> Iterator[str]:
     """The critic's objections to a trajectory's thoughts, one line each.
 
@@ -153,7 +164,9 @@ def thought_problems(
         trajectory: the trajectory.
         limits: the most words of a model's own thought of each kind; None if nothing tells them.
             Then the record may have objections that the critic does not have now.
+        read: counts the ``sentences``, and those ``unread``, in which the rules read no claim.
     """
+    counts: Counter[str] = Counter() if read is None else read
     quotes = trajectory.kind in QUOTING
     for index, turn in enumerate(trajectory.turns):
         if not turn.thoughts:
@@ -167,7 +180,10 @@ def thought_problems(
         for number, thought in enumerate(turn.thoughts):
             quoted = quotes and thought.writer == trajectory.actor
             limit = limits[thought.kind] if quoted and limits else MOST_WORDS
-            found = critic.check(thought.text, thought.kind, knowledge, limit=limit)
+            reviewed = critic.review(thought.text, thought.kind, knowledge, limit=limit)
+            found = reviewed.refusals
+            counts["sentences"] += reviewed.true + reviewed.false + reviewed.unknown
+            counts["unread"] += reviewed.unknown
             if quoted and limits:
                 codes = [*dict.fromkeys(each.code for each in found)]
                 for line in compared("refused", thought.refused, codes, "the critic"):
@@ -229,7 +245,8 @@ class _Worker:
             problems.append(f"the collection has no part {part!r:.80}")
         else:
             problems += self._caught(lambda: self._derived(task, trajectory, part))
-        problems += self._thoughts_checked(trajectory)
+        read: Counter[str] = Counter()
+        problems += self._thoughts_checked(trajectory, read)
         thoughts = sum(len(turn.thoughts) for turn in trajectory.turns)
         anew = self._reenact.writes(self._collection.manifest, trajectory)
         return Verdict(
@@ -239,6 +256,8 @@ class _Worker:
             pictures=trajectory.pictures if self._folder else 0,
             thoughts=thoughts if self._critic_works else 0,
             anew=thoughts if anew else 0,
+            sentences=read["sentences"],
+            unread=read["unread"],
         )
 
     def _derived(self, task: Task, trajectory: Trajectory, part: str) -> Iterator[str]:
@@ -253,12 +272,12 @@ class _Worker:
         album = Album(recorded, self._folder if recorded else None, _encoding(manifest.settings))
         yield from replay(self._of(part), task, trajectory, album, played)
 
-    def _thoughts_checked(self, trajectory: Trajectory) -> list[str]:
+    def _thoughts_checked(self, trajectory: Trajectory, read: Counter[str]) -> list[str]:
         if not self._critic_works:
             return []
         try:
             limits = self._collection.manifest.settings.get("thoughts", {}).get("limits", {})
-            return self._caught(lambda: thought_problems(trajectory, limits.get("alone")))
+            return self._caught(lambda: thought_problems(trajectory, limits.get("alone"), read))
         except NotImplementedError:
             self._critic_works = False
             return []

@@ -6,11 +6,9 @@ from dataclasses import replace
 
 from support import in_one_test
 
-from er_gym.data.clauses.judging import unknown_sentences
-from er_gym.data.critic import check
+from er_gym.data.critic import check, review
 from er_gym.data.knowledge import Knowledge, LastAction
-from er_gym.data.thought import Thought
-from er_gym.data.trajectory import SeenObject, Subgoal
+from er_gym.data.trajectory import SeenObject, Subgoal, ThoughtRecord
 from er_gym.envs.actions import Action
 
 LIMIT = 200
@@ -100,6 +98,24 @@ def codes(text: str) -> set[str]:
         ("Perhaps the apple is in the fridge.", "memory"),
         ("The apple is resting snugly in my palm.", "held"),
         ("The apple is propped on the fridge.", "support"),
+        ("The kettle came along without any trouble when I grabbed it.", "history"),
+        ("Everything I have tried so far has worked.", "history"),
+        ("None of my attempts has failed.", "history"),
+        ("My grab at the mug came to nothing.", "history"),
+        ("I have never touched the cabinet.", "history"),
+        ("I'm going to the sink because the apple goes in there.", "task"),
+        ("The mug has to go in the fridge.", "task"),
+        ("I go to the sink since the mug is nowhere to be found.", "held"),
+        ("The mug slipped out of my hand.", "history"),
+        ("I'm opening the fridge now.", "decision"),
+        ("Off to the fridge I go.", "decision"),
+        ("Never mind the sink.", "decision"),
+        ("Mug first, cabinet second: that was my route.", "history"),
+        ("水壶一伸手就拿到了。", "history"),
+        ("到目前为止每一步都成功了。", "history"),
+        ("去水槽是为了把苹果放进去。", "task"),
+        ("水槽先不去了。", "decision"),
+        ("马克杯还没找到。", "held"),
         ("水壶刚才已经被我拿到了。", "history"),
         ("橱柜我一次都没打开过。", "history"),
         ("我先拿了马克杯，后来才开的橱柜。", "history"),
@@ -135,6 +151,32 @@ def test_false_claims_are_refused(case: tuple[str, str]) -> None:
         "I was asked to put the mug in the sink before anything else.",
         "No water is pouring out of the faucet.",
         "Two bins may stand there, neither of which matters.",
+        "Had I gone to the fridge, I might have seen the egg.",
+        "If the fridge were open, the egg would be in my hand by now.",
+        "Were the faucet on, water would be running.",
+        "After I have opened the fridge, I will know more.",
+        "With the kettle in hand I could have made tea.",
+        "The apples are in view and neither of them is of use.",
+        "The cabinet's been opened and closed again.",
+        "I never opened the cabinet a second time.",
+        "I needn't have opened the cabinet.",
+        "I thought the apple would be in the fridge, but it is on the counter.",
+        "The cabinet that I saw from the counter is not in view.",
+        "Apart from the kettle, everything I tried worked.",
+        "The mug has to go in the sink.",
+        "I can't help noticing two apples, and not a hint of an egg.",
+        "The handle for the fridge is on my left.",
+        "None of the faucets is on.",
+        "I couldn't see the apples before I came to the counter.",
+        "I was told that no kettle was within reach.",
+        "要是当初先去冰箱，就不用打开橱柜了。",
+        "假如苹果在冰箱里，我现在就该打开它了。",
+        "到了水槽那边，我就把马克杯放下。",
+        "等马克杯到了水槽里，任务就完成了。",
+        "打开橱柜以后，我就能看清楚了。",
+        "我没想到苹果会在料理台上。",
+        "除了水壶没拿到，其他都成功了。",
+        "提示说够得着的范围里没有水壶。",
         "水壶刚才没拿到。",
         "冰箱我一次都没打开过。",
         "我先开了橱柜，后来才拿的马克杯。",
@@ -147,9 +189,33 @@ def test_true_claims_stand(text: str) -> None:
     assert codes(text) == set()
 
 
+def test_what_is_said_of_earlier_thoughts_is_compared_with_them() -> None:
+    thoughts = ["The fridge may hold it.", *("I go on.",) * (len(DONE) - 1)]
+    earlier = [[ThoughtRecord(kind="planning", text=each)] for each in thoughts]
+    told = replace(KITCHEN, earlier=earlier)
+
+    def found(text: str, known: Knowledge = told) -> set[str]:
+        language = "en" if text.isascii() else "zh"
+        known = replace(known, language=language)
+        return {each.code for each in check(text, "reasoning", known, limit=LIMIT)}
+
+    for text in (
+        "As I suspected earlier, the toaster was no good.",
+        "I had never considered the fridge before.",
+        "我早就提到过烤面包机。",
+    ):
+        assert "memory" in found(text)
+        assert "memory" not in found(text, replace(told, earlier=[[], *earlier[1:]]))
+    for text in ("As I suspected earlier, the fridge was no good.", "我从没想过烤面包机。"):
+        assert found(text) == set()
+
+
 def test_sentences_without_a_claim_are_counted_as_unknown() -> None:
-    thought = Thought("How dull. The faucet is off.", "reasoning", LIMIT, KITCHEN)
-    assert unknown_sentences(thought) == (1, 2)
+    found = review("How dull. The faucet is off.", "reasoning", KITCHEN, limit=LIMIT)
+    assert (found.true, found.false, found.unknown) == (1, 0, 1)
+    assert found.open == ("How dull.",)
+    lie = review("How dull. The faucet is on.", "reasoning", KITCHEN, limit=LIMIT)
+    assert (lie.true, lie.false, lie.unknown) == (0, 1, 1)
 
 
 @in_one_test(

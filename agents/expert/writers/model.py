@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from agents.expert.writers.base import ThoughtRequest, ThoughtWriter, WrittenThoughts
 from agents.expert.writers.prompts import WriterPrompts
+from agents.expert.writers.reader import Critic
 from agents.expert.writers.registry import checked_grounded
 from agents.expert.writers.replies import (
     NO_REPLY,
@@ -18,7 +19,7 @@ from agents.expert.writers.replies import (
 from agents.vlm.chat import Client, Message, ModelError, Reply, model_reply
 from agents.vlm.pictures import within_bounds
 from agents.vlm.settings import AgentSettings
-from er_gym.data.critic import Refusal, check
+from er_gym.data.critic import Refusal
 from er_gym.data.trajectory import ThoughtRecord
 from er_gym.rollout.agent import ModelReply
 
@@ -40,6 +41,7 @@ class ModelWriter:
         prompts: what it is told.
         fallback: writes what the model does not; by default the grounded writer, checked by the
             critic.
+        critic: checks the model's thoughts; by default the rules alone.
 
     Raises:
         ValueError: the settings ask for another form of replies than tags.
@@ -52,11 +54,13 @@ class ModelWriter:
         settings: AgentSettings,
         prompts: WriterPrompts,
         fallback: ThoughtWriter | None = None,
+        critic: Critic | None = None,
     ) -> None:
         check_settings(settings)
         self.name = name
         self._client, self._settings, self._prompts = client, settings, prompts
         self._fallback = fallback or checked_grounded()
+        self._critic = critic or Critic()
 
     def write(self, request: ThoughtRequest) -> WrittenThoughts:
         """Write the thoughts of a turn; see :class:`~agents.expert.writers.base.ThoughtWriter`.
@@ -67,7 +71,7 @@ class ModelWriter:
         shown = request.pictures if self._settings.sees == "pictures" else ()
         pictures = [within_bounds(each, self._settings.pictures) for each in shown]
         conversation = [self._prompts.role(), self._prompts.turn(request, pictures)]
-        drafts = _Drafts(request, self._prompts.echo_check)
+        drafts = _Drafts(request, self._prompts.echo_check, self._critic)
         replies: list[ModelReply] = []
         for attempt in range(TRIES):
             try:
@@ -84,7 +88,7 @@ class ModelWriter:
                     Message("assistant", (quoted(reply),)),
                     self._prompts.again(request, problems),
                 ]
-        return WrittenThoughts(self._records(request, drafts), tuple(replies))
+        return WrittenThoughts(self._records(request, drafts), (*replies, *drafts.asked))
 
     def _records(self, request: ThoughtRequest, drafts: _Drafts) -> tuple[ThoughtRecord, ...]:
         """The model's thoughts, and the fallback's where there is none that can stand."""
@@ -123,12 +127,16 @@ class _Drafts:
     Attributes:
         request: the turn.
         echo_check: checks that the model does not repeat its prompt.
+        critic: checks what it says.
+        asked: what the critic's model replied.
         texts: the thoughts that stand, by index.
         refused: the codes of the refusals of each thought, by index.
     """
 
     request: ThoughtRequest
     echo_check: EchoCheck
+    critic: Critic
+    asked: list[ModelReply] = field(default_factory=list)
     texts: dict[int, str] = field(default_factory=dict)
     refused: dict[int, list[str]] = field(init=False)
 
@@ -168,10 +176,9 @@ class _Drafts:
             for each, text in self.texts.items()
         ]
         known = replace(known, earlier=[*known.earlier, now])
-        refusals = (
-            *self.echo_check.refusals(found.text),
-            *check(found.text, kind, known, limit=limit),
-        )
+        checked = self.critic.check(found.text, kind, known, limit=limit)
+        self.asked += checked.replies
+        refusals = (*self.echo_check.refusals(found.text), *checked.refusals)
         if not refusals:
             self.texts[index] = found.text
         return refusals

@@ -54,6 +54,7 @@ class ModelSession:
         self._events: JsonLines | None = None
         self._keeping = threading.Lock()
         self._directory = directory
+        self._beside: list[Client] = []
         try:
             from agents.vlm.clients.budget import Budget, Ledger
             from agents.vlm.clients.supervisor import RequestSupervisor
@@ -72,6 +73,31 @@ class ModelSession:
         except ImportError as error:
             raise MissingPackage(name, str(error.name), kind.install) from error
 
+    def beside(self, name: str, settings: AgentSettings) -> Client:
+        """Another model's client, with this session's ledger, reply cache and supervisor.
+
+        Its replies cost what the session's own settings state, and count against the same budget.
+
+        Args:
+            name, settings: as the session itself takes them.
+
+        Raises:
+            ValueError: the name belongs to no client, or a package is missing.
+            CannotGoOn: there is no key, or the model cannot be loaded.
+        """
+        kind, opened = resolve_client(name)
+        try:
+            client = kind.open(opened, settings, self._ledger, self.supervisor)
+            found: Client = client
+            if self._directory is not None:
+                from agents.vlm.clients.reply_cache import ReplyCache
+
+                found = ReplyCache(client, self._directory / REPLIES)
+        except ImportError as error:
+            raise MissingPackage(name, str(error.name), kind.install) from error
+        self._beside.append(found)
+        return found
+
     @property
     def cost(self) -> Cost | None:
         """The cost of the run so far; None without a directory."""
@@ -87,7 +113,8 @@ class ModelSession:
 
     def close(self) -> None:
         """Close the client, the ledger and the event log."""
-        self.client.close()
+        for client in (*self._beside, self.client):
+            client.close()
         self._ledger.close()
         if self._events is not None:
             self._events.close()

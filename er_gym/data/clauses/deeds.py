@@ -39,8 +39,10 @@ def judge_deeds(thought: Thought) -> Iterator[Verdict]:
             if each.sentence == clause.sentence
         )
         for verb, phrases in lexicon.deeds.items():
+            if not clause.mentions or not lexicon.deed_words[verb].search(clause.text):
+                continue
             group = "y" if verb == verbs.PUT else "x"
-            for match in span.matches(phrases):
+            for match in span.matches_of(phrases, thought.phrases.of_other):
                 mention = span.named(match, group)
                 if mention is None:
                     continue
@@ -99,7 +101,7 @@ def _deed(
         act == verbs.PICKUP and _failed(thought, act, mention)
     )
     # Places are gone to by their type; whatever else is done is done to one of several.
-    several = act != verbs.NAVIGATE and sum(1 for _ in thought.things(mention.types)) > 1
+    several = act != verbs.NAVIGATE and thought.are_several(mention.types)
     some = _OF_SOME.match(match.string, match.end())
     if (
         done
@@ -160,6 +162,8 @@ _PAST = re.compile(
 )
 
 
+_ROUTE = re.compile(r"\b(?:that was|how i|was how|my route|was the order|how it went)\b")
+"""It tells of a course that was taken."""
 _SAYS_WHEN = re.compile(
     r"\b(?:first|before|after|afterwards?|then|later|subsequently)\b|[先后]|之前|以前"
 )
@@ -177,8 +181,9 @@ def judge_order(thought: Thought) -> Iterator[Verdict]:
             continue
         for match in span.matches(lexicon.order):
             parts = (match["a"], match["b"])
-            if any(lexicon.planned.search(part) for part in parts) or not all(
-                _PAST.search(part) or lexicon.failing.search(part) for part in (match.group(),)
+            past = _PAST.search(match.group()) or _ROUTE.search(span.text)
+            if any(lexicon.planned.search(part) for part in parts) or not (
+                past or lexicon.failing.search(match.group())
             ):
                 continue
             first, then = (_turns(thought, span, match, group) for group in "ab")
@@ -225,10 +230,10 @@ def judge_answers(thought: Thought) -> Iterator[Verdict]:
         told = lexicon.told.search(span.text)
         if told is None or any(each.asks for each in span.clauses):
             continue
-        said = next((why for why, each in lexicon.answers.items() if each.search(span.text)), "")
+        said = [why for why, each in lexicon.answers.items() if each.search(span.text)]
         if not said:
             continue
-        meant = _meant(thought, span)
+        meant = _meant(thought, span, told.start())
         if meant is None:
             continue
         if not meant:
@@ -241,7 +246,7 @@ def judge_answers(thought: Thought) -> Iterator[Verdict]:
                     ),
                 )
             continue
-        fits = any(_answers(each, said) for each in meant)
+        fits = any(_answers(each, why) for each in meant for why in said)
         last = meant[-1]
         yield Verdict(
             span.sentence,
@@ -255,11 +260,15 @@ def _quoted(each: LastAction) -> str:
     return each.feedback.split(".")[0].split(" There is")[0] or "none"
 
 
-def _meant(thought: Thought, span: Span) -> list[LastAction] | None:
-    """The actions that a sentence speaks of; None if that is open."""
+def _meant(thought: Thought, span: Span, told: int) -> list[LastAction] | None:
+    """The actions that a sentence speaks of; None if that is open.
+
+    What stands before the answer is what it was given to.
+    """
     lexicon = lexicon_of(thought)
+    named = span.among(0, told) or span.mentions
     said = {verb for verb, phrase in lexicon.plain_verbs.items() if phrase.search(span.text)}
-    types = all_interchangeable(each for mention in span.mentions for each in mention.types)
+    types = all_interchangeable(each for mention in named for each in mention.types)
     if not types:
         return None
     of_things = [each for each in thought.known.actions if each.action.object_type in types]

@@ -20,6 +20,7 @@ class Lexicon:
     Attributes:
         deeds: what the agent has done, by verb (``searched`` is one), with its object: group ``x``,
             or ``y`` for where something was put. Not to be said of somebody else.
+        deed_words: without one of which none of these are said, by verb.
         denied_deeds: what the agent has not done, by verb, with its object ``x``.
         first_try: a deed succeeded at once.
         undone: before or in a deed: it was not done.
@@ -37,6 +38,7 @@ class Lexicon:
         task: the task is quoted; what follows is what it asks for.
         chores: what a task may ask for, by the words that the instruction then has.
         rooms: the kinds of rooms.
+        any_room: without which no room is named.
         room_in_general: a room is named, but not as this one.
         states: ``x`` is in a state, with the groups of
             :attr:`er_gym.data.phrases.Phrases.states`.
@@ -73,6 +75,7 @@ class Lexicon:
     """
 
     deeds: Mapping[str, Sequence[Words]]
+    deed_words: Mapping[str, Words]
     denied_deeds: Mapping[str, Sequence[Words]]
     first_try: Words
     undone: Words
@@ -90,6 +93,7 @@ class Lexicon:
     task: Words
     chores: Mapping[str, tuple[Words, Words]]
     rooms: Mapping[str, Words]
+    any_room: Words
     room_in_general: Words
     states: Sequence[Words]
     none_of: Words

@@ -13,7 +13,7 @@ _NO = (
     "|i|we|it|there|see|has|have|had|which|can|will|was|were|then|so|before|after|until|when|while"
     "|out|up|down|off|over|back|nothing|something|anything|everything|that|where|because|without"
 )
-_D = r"(?:(?!(?:" + _NO + r") )[a-z0-9'-]+ ){0,3}"
+BEFORE_NAME = _D = r"(?:(?!(?:" + _NO + r") )[a-z0-9'-]+ ){0,3}"
 """Articles and adjectives before a name."""
 _OF = r"(?:the (?:lid|door|doors|inside|front|top|side) of )?"
 _XS = rf"(?P<xs>{MARK}(?:(?:,? and,? |,? n?or |, |,? as well as |/){_D}{MARK})*)"
@@ -78,6 +78,7 @@ LEXICON = Lexicon(
         verbs.PICKUP: (
             *_deed(_TOOK, "picking up|taking|grabbing|fetching|collecting|retrieving", "picked up|taken|grabbed|collected|fetched|retrieved"),
             re.compile(rf"(?:{_DONE}) (?:picked|took|taken|lifted|picking|pick) {_D}{_X}(?: right)? (?:up|away|out|along|with me)\b"),
+            re.compile(rf"(?:{_I}) got {_D}{_X}(?=$|[.;]| (?:earlier|before|already|from|out of|off)\b)"),
             re.compile(r"\b(?:managed|was able|did manage) to (?:pick up|take|grab|get hold of|get|fetch|collect) " + _D + _X),
             re.compile(rf"\b(?:grabbing|taking|picking up|getting|fetching|lifting|collecting) (?:hold of )?{_D}{_X} (?:was (?:easy|simple|no (?:trouble|problem|effort)|effortless|a breeze|quick|straightforward|a success)|worked(?! out badly)|went (?:well|fine|smoothly|through|off)|succeeded|posed no)"),
             re.compile(rf"\bsucceeded in (?:grabbing|taking|picking up|getting|fetching|lifting|collecting) (?:hold of )?{_D}{_X}"),
@@ -103,6 +104,15 @@ LEXICON = Lexicon(
             *_deed(_SEARCHED, "searching|checking|inspecting|examining|going through|looking (?:in|into|inside|through)|peering into", "searched|checked|examined|inspected|explored|ruled out"),
             re.compile(rf"\bmy (?:search|inspection|check) of {_D}{_X}"),
         ),
+    },
+    deed_words={
+        verbs.OPEN: re.compile(r"open|swung|flung|slid|unlatch|lift|rais|flip|popp"),
+        verbs.CLOSE: re.compile(r"clos|shut|slamm|got|push|pull|slid"),
+        verbs.PICKUP: re.compile(r"pick|tak|took|grab|got|fetch|collect|retriev|snatch|scoop|seiz|gather|gripp|laid|pluck|remov|c[ao]me|lift|get|lung|tr[yi]|attempt|reach"),
+        verbs.PUT: re.compile(r"plac|dropp|stow|laid|deposit|stor|toss|thr|deliver|shov|tuck|popp|mov|slipp|park|put|set|left"),
+        verbs.TOGGLE: re.compile(r"switch|turn|flick|flipp|toggl|power|shut"),
+        verbs.NAVIGATE: re.compile(r"gone|w[ea]n?t|been|walk|mov|travel|navig|return|head|run|hurr|step|roll|driv|drov|c[ao]me|got|popp|stopp|ma[kd]e|pa[iu]|visit|reach|approach|call|set|dropp|arriv|swung|go"),
+        "searched": re.compile(r"search|check|examin|inspect|explor|investig|comb|rummag|gone|went|been|go|sift|look|peer|peek|glanc|had|tak|took|pok|dug|stuck|rul|tri|cross"),
     },
     denied_deeds={
         verb: (
@@ -143,16 +153,20 @@ LEXICON = Lexicon(
         re.compile(r"\bit was(?: only)? after (?P<a>[^.;]{0,120}?§[^.;]{0,120}?) that (?P<b>[^.;]{0,120}?§)"),
         re.compile(r"(?P<a>[^.;,]{0,90}§[^.;,]{0,90}?) (?:first|beforehand),? (?:and )?(?:only )?(?:then|afterwards|after that|later)\b(?P<b>[^.;,]{0,90}?§)"),
         re.compile(r"(?P<b>[^.;,]{0,90}§[^.;,]{0,90}?) (?:only |right |just |shortly )*after (?P<a>(?:i|having|opening|picking|taking|visiting|going|checking|looking|closing|reaching|switching|putting|the|my)\b[^.;,]{0,90}?§)"),
+        re.compile(r"^(?:the |my )?(?P<a>§)(?: (?:was (?:done|dealt with|handled|seen to|opened|searched|checked|visited|moved|picked up|put away)|came))? first(?: of all)?,? (?:and )?(?:then )?(?:the |my )?(?P<b>§) ?(?:second|next|then|afterwards|after (?:it|that)|later|last)\b"),
+        re.compile(r"^first(?: came| it was| i (?:went|walked|headed|tried|searched|checked|opened))?(?: to| for)? (?:the |my )?(?P<a>§),? (?:and )?(?:then|next|after that|afterwards)(?: came| it was| i \w+)?(?: to| for)? (?:the |my )?(?P<b>§)"),
+        re.compile(r"\bi (?P<a>[^.;,§]{0,30}§[^.;,§]{0,15}?) first(?: of all)?,? (?:and |before )?(?:i )?(?P<b>[^.;,§]{0,30}§)"),
         re.compile(r"\bonly (?:once|after|when) (?P<a>[^.;,]{0,90}?§[^.;,]{0,90}?),? did i (?P<b>[^.;,]{0,90}?§)"),
     ),
     planned=re.compile(r"\b(?:will|'ll|let|going to|shall|should|need|must|could|would|can|may|might|want|plan|if|if i|until|to do|i'm|i am|had i|hadn't|next step)\b"),
-    told=re.compile(r"\b(?:told(?! to\b)|system|message|feedback|remark|reply|replied|response|reported|complain(?:ed|t)|came back (?:as|with)|was (?:turned down|refused|rejected|denied)|refused (?:to|when|my)|notice (?:said|read)|notified|informed|according to|warned|advised|error said|it said|they said)\b"),
+    told=re.compile(r"\b(?:told(?! to\b)|system|message|feedback|remark|reply|replied|response|reported|complain(?:ed|t)|came back (?:as|with)|was (?:turned down|refused|rejected|denied)|refused (?:to|when|my)|notice (?:said|read)|notified|informed|according to (?:the )?(?:system|message|answer|reply|feedback|response)|warned|advised|error said|it said|they said(?! to\b))\b"),
     answers={
         "full hand": re.compile(r"\b(?:hands?|arms?|grip|gripper) (?:was|were|is|are|being|already|had been)?\s*(?:already )?(?:full|occupied|busy|taken)|full hands?|already (?:held|holding|carrying|hold)|too (?:much|many)(?: things)? in my hands?"),
         "empty hand": re.compile(r"\b(?:hands?|grip|gripper) (?:was|were|is|are) empty|nothing in my hand"),
         "far": re.compile(r"\btoo (?:far|distant)|(?:out of|beyond|not (?:within|in)|wasn't (?:within|in)|none (?:is|was) within|isn't within|no [^,.]{0,20} within) (?:my )?reach|can(?:not|'t) reach|couldn't reach|come closer|get closer|not near enough|not close enough"),
         "stuck": re.compile(r"\b(?:wouldn't|would not|won't|didn't|refused to|does not|doesn't|did not) (?:budge|open|move|give|come open|close|shut)|\b(?:stuck|locked|jammed|sealed|blocked)\b|(?:lifting|opening|closing|shutting|raising|pulling)[^,.]{0,25}(?:was|were|got) (?:refused|rejected|denied|turned down)"),
         "no room": re.compile(r"\b(?:is|was|were|already) (?:too )?full\b|no (?:room|space|place)\b"),
+        "otherwise": re.compile(r"(?:\bit|\bthey|\bthat|§)(?: [a-z]+)? (?:was|were|is|are)(?: still| too| already| locked)* (?:inside|in the way|behind|wet|hot|heavy|big|slippery|fragile|in use|mine)\b|\bput (?:something|it) down|\bput down (?:something|what)\b|\balready (?:in my hand|holding|held)\b"),
         "no action": re.compile(r"\bno (?:such )?(?:valid |known )?action|names? no action|not (?:a|an) (?:valid |known )?action|(?:doesn't|does not|didn't|did not|not) (?:know|recogni[sz]e|understand)"),
         "done": re.compile(r"\bdone\b(?! with)|\b(?:success|succeeded|successful|all (?:was )?(?:well|fine|right)|went (?:fine|well|through|smoothly)|confirmed)\b"),
     },
@@ -176,6 +190,7 @@ LEXICON = Lexicon(
         "living room": re.compile(r"\b(?:living[- ]room|lounge|sitting[- ]room|parlou?r)\b(?! §| chair)"),
         "other": re.compile(r"\b(?:garage|basement|attic|classroom|hallway|corridor|cellar|garden|laundry room|dining room|library|workshop)\b(?! §)"),
     },
+    any_room=re.compile(r"room|kitchen|pantry|galley|lavatory|bedchamber|dormitory|quarters|lounge|parlo|garage|basement|attic|hallway|corridor|cellar|garden|library|workshop"),
     room_in_general=re.compile(r"\b(?:another|other|next|most|any|every|different|usually|normally|typically|often|if|were|not|n't|than|instead|belongs?|rather|would be|outside|towards?|no)\b|\b(?:kitchen|bathroom|bedroom|living room)s\b"),
     states=(
         re.compile(rf"{_X}(?: doors?| lid| light)?(?: (?:(?:over )?(?:on|to|off to) (?:my|the) (?:left|right|side)|ahead|in front of me|here|there|itself|nearby))?(?: (?:is|are|hangs?|stands?|stays?|remains?|sits?)|'s|,? with its doors?)(?P<no>n't| not| no longer)?(?: (?:still|already|now|just|also|quite|both|all|currently|clearly|hanging|standing|lying|drawn|pulled|pushed|switched|turned|left|wide|fully|properly|tightly|firmly|brightly|swung|merrily|flung|half|left))* (?:(?P<open>open|ajar|agape|gaping|unlatched)|(?P<closed>shut|closed|sealed|drawn(?= |$|[,.;])(?! back| up| open))|(?P<on>on(?=$|[,.;]| and\b| but\b| again)|lit|burning|running|glowing|blazing|humming|alight|gushing|flowing|dripping|shining|whirring|boiling|brewing|playing)|(?P<off>off(?=$|[,.;]| and\b| but\b| again| now)|out(?=$|[,.;]| and\b)|dark|unlit))\b(?! by\b| up\b|-| to\b| in\b| out of\b)"),
@@ -192,12 +207,12 @@ LEXICON = Lexicon(
         re.compile(rf"^(?:and |but |so |now |with )*(?:the |a |an |this |my )?{_X}(?: (?:safely|firmly|securely|already|now|finally))* in (?:hand|my (?:hand|grip|palm))(?=$|[,.;:])"),
     ),
     lies_on=(
-        re.compile(rf"{_X}(?: (?:is|are|lies?|sits?|stands?|rests?|hangs?|waits?)|'s)(?: (?:now|still|already|just|right|over|there|also|both|safely|neatly|good|carefully|happily|waiting|calmly|standing|sitting|perched|draped|lying|resting|hanging|balanced|propped|placed|left|leaning|stacked|piled|laid|set|kept|stowed|tucked|parked|slung|spread|mounted|hung))* (?:on|in|inside|over|atop|on top of|upon|within) {_D}{_Y}"),
-        re.compile(rf"{_X}(?: (?:now|still|already|just|right|over|there))* (?:standing|sitting|perched|draped|lying|resting|hanging|balanced|propped|leaning|stacked|piled|parked|slung|waiting) (?:on|in|inside|over|atop|on top of|upon|within) {_D}{_Y}"),
-        re.compile(rf"{_X} was left (?:on|in|inside|over|atop|on top of) {_D}{_Y}"),
+        re.compile(rf"{_X}(?: (?:is|are|lies?|sits?|stands?|rests?|hangs?|waits?)|'s)(?: (?:now|still|already|just|right|over|there|also|both|safely|neatly|good|carefully|happily|waiting|calmly|standing|sitting|perched|draped|lying|resting|hanging|balanced|propped|placed|left|leaning|stacked|piled|laid|set|kept|stowed|tucked|parked|slung|spread|mounted|hung))* (?:on|in|inside|over|atop|on top of|upon|within) (?:(?:the (?:edge|rim|top|corner|surface|lid|arm|back|seat|front|bottom|side) of|one of|each of|some of) )?{_D}{_Y}"),
+        re.compile(rf"{_X}(?: (?:now|still|already|just|right|over|there|has been left|have been left|was left|had been left|has been))* (?:standing|sitting|perched|draped|lying|resting|hanging|balanced|propped|leaning|stacked|piled|parked|slung|waiting) (?:on|in|inside|over|atop|on top of|upon|within) (?:(?:the (?:edge|rim|top|corner|surface|lid|arm|back|seat|front|bottom|side) of|one of|each of|some of) )?{_D}{_Y}"),
+        re.compile(rf"{_X} (?:was|were|has been|have been) left (?:on|in|inside|over|atop|on top of) {_D}{_Y}"),
     ),
     never_seen=(
-        re.compile(rf"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|once|even|ever|actually|so far|already))* (?:seen|laid eyes on|set eyes on|come across|spotted|noticed|sighted|encountered|glimpsed|caught sight of|lay eyes on|see|had sight of|run into|met)(?: (?:a|any|either|sign|trace|of|single|so|much|as|an?))* {_D}{_X}"),
+        re.compile(rf"(?:(?<!could )(?<!did )(?<!do )\bnot|(?<!could)(?<!did)(?<!do)n't|\bnever|yet to)(?: (?:yet|once|even|ever|actually|so far|already))* (?:seen|laid eyes on|set eyes on|come across|spotted|noticed|sighted|encountered|glimpsed|caught sight of|lay eyes on|see|had sight of|run into|met)(?: (?:a|any|either|sign|trace|of|single|so|much|as|an?))* {_D}{_X}"),
         re.compile(rf"{_X} (?:has|had|have|'s)(?: (?:still|so far|yet|simply))*(?:n't| not| never| yet)(?: (?:yet|so far|once|ever|even))* (?:to )?(?:shown?(?: (?:itself|up|its face|themselves))?|turned up|appeared|crossed my path|come into (?:view|sight)|surfaced|been (?:seen|spotted|sighted|in view|in sight)|emerged|come up|caught my eye|revealed itself|made an appearance|popped up|met my eyes?)"),
         re.compile(rf"\bno {_D}{_X} (?:has|had|have)(?: (?:yet|so far|ever))* (?:shown (?:itself|up)|turned up|appeared|crossed my path|come into (?:view|sight)|surfaced|been (?:seen|spotted|sighted)|caught my eye|emerged)"),
         re.compile(rf"{_X},? (?:which |that |whom )?i(?:'ve| have) (?:not|never|yet to|n't)(?: (?:yet|once|even|ever|so far|actually))* (?:seen|laid eyes on|come across|spotted|noticed|encountered|set eyes on|see)"),
@@ -225,6 +240,8 @@ LEXICON = Lexicon(
         re.compile(rf"\bcan't see {_D}{_XS}(?=$|[,.;!])"),
         re.compile(rf"{_XS} (?:can't|cannot|can not) be (?:seen|made out|spotted|found|discerned)(?=$|[,.;!]| (?:from|anywhere|at all|here|right now|in this))"),
         re.compile(rf"{_XS} (?:is|are|'s) nowhere to be found"),
+        re.compile(rf"\bno {_D}{_XS} (?:shows? up|turns? up|turned up|showed up|appears?)(?=$|[,.;]| in any| anywhere| in this view)"),
+        re.compile(rf"\b(?:looked|searched|scanned) (?:all )?(?:around|round|everywhere|in every direction)[^.§]{{0,20}} (?:and|but) (?:i )?(?:found|saw|see) no {_D}{_XS}(?=$|[,.;])"),
     ),
     not_on=(
         re.compile(rf"\b(?:no|not a|not a single|without a|isn't a|is not a|isn't any|see no) {_D}{_X} (?:on|in|inside|on top of) {_D}{_Y}"),
@@ -246,7 +263,7 @@ LEXICON = Lexicon(
     numbers={"two": 2, "both": 2, "pair of": 2, "couple of": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10, "eleven": 11, "twelve": 12, "a dozen": 12, **{str(n): n for n in range(2, 21)}},
     counted=re.compile(rf"\b(?P<n>two|pair of|couple of|three|four|five|six|seven|eight|nine|ten|eleven|twelve|a dozen|[2-9]|1\d|20) (?:of )?(?:(?:the|these|those|identical|separate|different|small|large|big|closed|open|shut|whole|matching|ripe|red|green|white|black|brown|wooden|empty|little|more|rolls of|bottles of|bars of|loaves of|pieces of|sheets of|slices of|other|nice|tall|fresh|clean|dirty|neat|shiny) )*{_X}"),
     only=(
-        re.compile(rf"\b(?:only|just|merely|no more than|nothing but|nothing more than|exactly)(?: (?:see|make out|spot|count|find|the|can|be))* (?:one|a single|a lone|a solitary|the one)(?: (?!of\b)[a-z-]+){{0,2}} {_X}"),
+        re.compile(rf"\b(?:only|just|merely|but|no more than|nothing but|nothing more than|exactly)(?: (?:see|make out|spot|count|find|the|can|be))* (?:one|a single|a lone|a solitary|the one)(?: (?!of\b)[a-z-]+){{0,2}} {_X}"),
         re.compile(rf"\b(?:a single|a lone|a solitary|the sole|the lone|the single|one lone|one single|the only|one and only one) (?:[a-z-]+ )?{_X}"),
         re.compile(rf"\b(?:make out|see|spot|count|find) (?:only |just |no more than )(?:one|a single) (?:[a-z-]+ )?{_X}"),
     ),

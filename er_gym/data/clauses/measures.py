@@ -70,7 +70,9 @@ def _counted(
     sides = {side for side, phrase in thought.phrases.sides.items() if phrase.search(clause.text)}
     if sides:
         those = [each for each in those if each.side in sides]
-    others = {each for other in span.mentions if other is not mention for each in other.types}
+    others = all_interchangeable(
+        each for other in span.mentions if other is not mention for each in other.types
+    )
     return [each for each in those if each.on in others] or those
 
 
@@ -150,7 +152,7 @@ def judge_rooms(thought: Thought) -> Iterator[Verdict]:
     if not possible:
         return
     for span in sentences_of(thought):
-        for room, phrase in lexicon.rooms.items():
+        for room, phrase in lexicon.rooms.items() if lexicon.any_room.search(span.text) else ():
             for match in phrase.finditer(span.text):
                 around = span.text[max(0, match.start() - _ROUND) : match.end() + _ROUND]
                 if lexicon.room_in_general.search(around) or match.group() in instruction:

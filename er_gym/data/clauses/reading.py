@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from er_gym.data.clauses.lexicon import Lexicon, Words
@@ -54,6 +54,17 @@ class Span:
             return None
         return self.first(match.start(group), match.end(group))
 
+    def matches_of(self, phrases: Iterable[Words], of_other: Words) -> Iterator[re.Match[str]]:
+        """Every match of some phrases but those that begin with the place of another thing.
+
+        "The egg from the fridge is in my hand" tells nothing of the fridge.
+        """
+        for match in self.matches(phrases):
+            before = self.text[: match.start()]
+            begins = self.text[match.start() : match.start() + 1] == MARK
+            if not (begins and MARK in before and of_other.search(before)):
+                yield match
+
     def first(self, start: int, end: int) -> Mention | None:
         """The first name in a part of the text."""
         return next(iter(self.among(start, end)), None)
@@ -64,7 +75,9 @@ class Span:
         return [mention for place, mention in pairs if start <= place < end]
 
     def matches(self, phrases: Iterable[Words]) -> Iterator[re.Match[str]]:
-        """Every match of some phrases."""
+        """Every match of some phrases, all of which have a name in them."""
+        if not self.mentions:
+            return
         for phrase in phrases:
             yield from phrase.finditer(self.text)
 
@@ -74,14 +87,26 @@ def lexicon_of(thought: Thought) -> Lexicon:
     return LEXICONS[thought.known.language]
 
 
-def clauses_of(thought: Thought) -> Iterator[tuple[Clause, Span]]:
+def clauses_of(thought: Thought) -> Sequence[tuple[Clause, Span]]:
     """Each clause of a thought, as a span too."""
-    for each in thought.parts:
-        yield each, Span(each.text, each.mentions, each.places, each.sentence, (each,))
+    found: Sequence[tuple[Clause, Span]] | None = thought.kept.get("clauses")
+    if found is None:
+        found = thought.kept["clauses"] = [
+            (each, Span(each.text, each.mentions, each.places, each.sentence, (each,)))
+            for each in thought.parts
+        ]
+    return found
 
 
-def sentences_of(thought: Thought) -> Iterator[Span]:
+def sentences_of(thought: Thought) -> Sequence[Span]:
     """Each sentence of a thought as a whole."""
+    found: Sequence[Span] | None = thought.kept.get("sentences")
+    if found is None:
+        found = thought.kept["sentences"] = [*_sentences(thought)]
+    return found
+
+
+def _sentences(thought: Thought) -> Iterator[Span]:
     groups: dict[int, list[Clause]] = {}
     for each in thought.clauses:
         groups.setdefault(each.sentence, []).append(each)

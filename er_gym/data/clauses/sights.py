@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from er_gym.data.claims import is_given, is_placing, not_on
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, is_told, lexicon_of, sentences_of
 from er_gym.data.mentions import Mention, all_interchangeable
+from er_gym.data.remembered import BELIEVED
 from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.tasks import verbs
 from er_gym.thor import OBJECT_TYPES
@@ -25,7 +26,7 @@ def judge_never_seen(thought: Thought) -> Iterator[Verdict]:
     """The agent never saw a thing."""
     lexicon = lexicon_of(thought)
     for span in sentences_of(thought):
-        for match in span.matches(lexicon.never_seen):
+        for match in span.matches_of(lexicon.never_seen, thought.phrases.of_other):
             mention = span.named(match, "x")
             rest = span.text[match.end() : match.end() + _NEAR_BY].split(",")[0].split("，")[0]
             inside = span.text[match.start() : match.end()]
@@ -56,7 +57,7 @@ def judge_memories(thought: Thought) -> Iterator[Verdict]:
             continue
         here = lexicon.since_here.search(span.text)
         at = next((each for each in span.matches(lexicon.while_at) if span.named(each, "y")), None)
-        for match in span.matches(lexicon.seen_then):
+        for match in span.matches_of(lexicon.seen_then, thought.phrases.of_other):
             mention = span.named(match, "x")
             if mention is None or lexicon.undone.search(
                 span.text, max(0, match.start() - 2), match.end()
@@ -111,7 +112,7 @@ def judge_denials(thought: Thought) -> Iterator[Verdict]:
             continue
         if not clause.negated and "out of" not in clause.text:
             continue
-        for match in span.matches(lexicon.not_in_view):
+        for match in span.matches_of(lexicon.not_in_view, thought.phrases.of_other):
             # "Not the mug or the apple" denies both, and guesses nothing.
             if thought.phrases.hedge.search(
                 f"{clause.text[: match.start()]} {clause.text[match.end() :]}"
@@ -155,6 +156,8 @@ def judge_guesses(thought: Thought) -> Iterator[Verdict]:
     for clause, span in clauses_of(thought):
         if not clause.hedged or clause.asks or clause.conditional or clause.intended:
             continue
+        if BELIEVED[thought.known.language].search(clause.text):
+            continue
         if clause.usual or clause.negated or lexicon.another.search(clause.text):
             continue
         for match in span.matches(lexicon.perhaps_on):
@@ -190,7 +193,7 @@ def judge_sights(thought: Thought) -> Iterator[Verdict]:
                     "unseen", f"“{stranger.group()}” is not and was not in view. Leave it out."
                 ),
             )
-        for match in span.matches(lexicon.seeing_now):
+        for match in span.matches_of(lexicon.seeing_now, thought.phrases.of_other):
             mention = span.named(match, "x")
             if mention is None or clause.wanted:
                 continue

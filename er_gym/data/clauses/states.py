@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 
 from er_gym.data.claims import is_placing, not_on, subjects, told_to_be_on
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, is_told, lexicon_of
-from er_gym.data.mentions import Mention
+from er_gym.data.mentions import Mention, all_interchangeable
 from er_gym.data.thought import Refusal, Thought, name_of
+from er_gym.tasks import verbs
 
 STATES: Mapping[str, tuple[bool, tuple[str, ...]]] = {
     "open": (True, ("open",)),
@@ -29,7 +31,7 @@ def judge_states(thought: Thought) -> Iterator[Verdict]:
             continue
         claims = [
             (mention, match)
-            for match in span.matches((*lexicon.states, *phrases.states))
+            for match in span.matches_of((*lexicon.states, *phrases.states), phrases.of_other)
             if (mention := span.named(match, "x"))
         ]
         of_it = phrases.it_states.search(clause.text) if clause.it else None
@@ -40,6 +42,8 @@ def judge_states(thought: Thought) -> Iterator[Verdict]:
             none = lexicon.none_of.search(before)
             if not none and phrases.negation.search(before):
                 continue
+            if _is_to_be(thought, mention, match):
+                continue
             if lexicon.state_since.match(clause.text, match.end()):
                 continue
             said = match.groupdict()
@@ -49,6 +53,16 @@ def judge_states(thought: Thought) -> Iterator[Verdict]:
         runs_from = span.named(poured, "x") if poured else None
         if runs_from is not None and not clause.negated:
             yield _state(thought, span, runs_from, "on", False)
+
+
+def _is_to_be(thought: Thought, mention: Mention, match: re.Match[str]) -> bool:
+    """Whether "with the drawer closed" tells what is so after the next action."""
+    decision = thought.known.decision
+    return (
+        match.group().startswith("with ")
+        and decision.verb in (verbs.OPEN, verbs.CLOSE, verbs.TOGGLE)
+        and decision.object_type in all_interchangeable(mention.types)
+    )
 
 
 def _state(thought: Thought, span: Span, mention: Mention, word: str, negated: bool) -> Verdict:
@@ -84,7 +98,7 @@ def judge_hand(thought: Thought) -> Iterator[Verdict]:
         if empty and not clause.intended and not lexicon.at_times.search(clause.text):
             refusal = Refusal("held", f"The hand is not empty: {truth}.")
             yield Verdict(span.sentence, refusal if held else None)
-        for match in span.matches((*lexicon.held, *phrases.held)):
+        for match in span.matches_of((*lexicon.held, *phrases.held), phrases.of_other):
             senses = (phrases.negation, phrases.intention, phrases.goal, lexicon.at_times)
             if any(clause.says_before(sense, match.end()) for sense in senses):
                 continue
@@ -110,20 +124,20 @@ def judge_hand(thought: Thought) -> Iterator[Verdict]:
 def judge_supports(thought: Thought) -> Iterator[Verdict]:
     """A thing in view lies on another."""
     lexicon, phrases = lexicon_of(thought), thought.phrases
-    claims = [(clause.sentence, *those) for clause, *those in told_to_be_on(thought)]
+    claims = [(clause.sentence, thing, holder) for clause, thing, holder in told_to_be_on(thought)]
     for clause, span in clauses_of(thought):
         if not clause.is_fact or (clause.past and "was left" not in clause.text):
             continue
         for match in span.matches(lexicon.lies_on):
-            mention, holder = span.named(match, "x"), span.named(match, "y")
-            if mention and holder and not is_placing(clause, match.start("x"), phrases):
-                claims.append((span.sentence, mention, holder))
-    for sentence, mention, holder in claims:
-        wrong = not_on(thought, mention, holder)
+            mention, under = span.named(match, "x"), span.named(match, "y")
+            if mention and under and not is_placing(clause, match.start("x"), phrases):
+                claims.append((span.sentence, mention, under))
+    for sentence, thing, holder in claims:
+        wrong = not_on(thought, thing, holder)
         if wrong:
             refusal = Refusal(
-                "support", f"{name_of(mention)} is not in or on {name_of(holder)}: {wrong}."
+                "support", f"{name_of(thing)} is not in or on {name_of(holder)}: {wrong}."
             )
             yield Verdict(sentence, refusal)
-        elif any(True for _ in thought.things(mention.types)):
+        elif any(True for _ in thought.things(thing.types)):
             yield Verdict(sentence)

@@ -7,6 +7,7 @@ import json
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -20,11 +21,15 @@ from small_suite import NAME, small
 from verified import problems
 
 from agents.expert.decider import Deciders, DecidingAgent
+from agents.expert.writers.reader import Critic, reader_settings
+from agents.vlm.clients.session import ModelSession
+from agents.vlm.settings import AgentSettings
 from benchmarks.checks.expert_server import collect_with_faults, wrong_thoughts
 from benchmarks.checks.scripted_expert import answers, good, scripted_expert
 from benchmarks.cli.main import cli
-from benchmarks.harness.chat_server import ChatServer
+from benchmarks.harness.chat_server import ChatServer, Fault, Messages, text_of
 from er_gym.data.collection import Collection
+from er_gym.data.knowledge import knowledge_at
 from er_gym.data.trajectory import Trajectory
 
 SMALL = ("--set", "pictures.width=64", "--set", "pictures.height=48")
@@ -103,7 +108,72 @@ def test_the_manifest_states_the_model_and_no_secret(
     assert "holds another collection" in str(other.exception)
 
 
+def verified(out: Path, *more: str) -> Any:
+    command = ["data", "verify", str(out), "--suite", NAME, "--workers", "1", *more]
+    return CliRunner().invoke(cli, command, standalone_mode=False)
+
+
+def reading(objects_to: str) -> tuple[Fault, list[str]]:
+    """A server of two models: one writes thoughts, the other reads them and objects to some words.
+
+    Returns:
+        The server's script, and the words of each question to the one that reads.
+    """
+    asked: list[str] = []
+
+    def say(messages: Messages) -> str:
+        if "You check the thoughts" not in text_of(messages[0]):
+            return good(messages)
+        told = text_of(messages[1])
+        asked.append(told)
+        parts = told.rsplit("The parts to check, as JSON:", 1)[1]
+        verdict = "false" if objects_to in parts else "unknown"
+        return json.dumps({"claims": [{"claim": parts, "verdict": verdict, "fact": "F1"}]})
+
+    return answers(say), asked
+
+
+def test_a_second_model_reads_what_the_rules_leave_open(tmp_path: Path) -> None:
+    fault, asked = reading("my second move")
+    more = ("--limit", "1", "--types", "single_search", "--critic", "openai:reader")
+    with ChatServer(fault) as server:
+        result = with_expert(server.url, tmp_path, *more)
+        assert result.return_value == 0, result.output
+        (one,) = trajectories(tmp_path)
+        refused = {code for turn in one.turns for each in turn.thoughts for code in each.refused}
+        assert refused == {"reader"}
+        assert Collection.open(tmp_path).manifest.settings["expert"]["critic"]["name"]
+        assert one.cost.requests >= server.count  # the same question is asked once
+        told = " ".join(result.output.split())
+        found = re.search(r"The model was asked about (\d+) thoughts", told)
+        assert found is not None
+        assert int(found[1]) >= len(asked) > 0
+        assert "no claim in" in told
+        before = server.count
+        url = ("--critic", "openai:reader", "--base-url", server.url, *SMALL)
+        again = verified(tmp_path, *url)
+        assert again.return_value == 0, again.output
+        assert server.count - before <= sum(
+            each.writer == "grounded" for turn in one.turns for each in turn.thoughts
+        )
+        assert "The model was asked about" in again.output
+
+
+def test_a_collection_that_is_there_is_read_by_a_model(tmp_path: Path, server: ChatServer) -> None:
+    collect(tmp_path, "--limit", "1", "--types", "single_search", "--no-pictures")
+    fault, asked = reading("")
+    with ChatServer(fault) as reader:
+        url = ("--critic", "openai:reader", "--base-url", reader.url)
+        found = verified(tmp_path, "--no-pictures", *url)
+    assert asked
+    assert found.return_value != 0
+    assert "reader: “" in " ".join(found.output.split())
+    alone = verified(tmp_path, "--base-url", server.url)
+    assert "is for a model: give --critic" in str(alone.exception)
+
+
 NEEDS_A_MODEL = [
+    ("--critic", "openai:m"),
     ("--base-url", "http://127.0.0.1:1/v1"),
     ("--max-usd", "1"),
     ("--set", "sampling.top_p=0.5"),
@@ -120,6 +190,11 @@ MISFITS = [
     (("--expert", "recorded:x"), "--expert recorded:x is for a model that decides"),
     (("--expert", "openai:m", "--decisions", "model", "--places", "model"), "has no plan"),
     (("--expert", "openai:m", "--decisions", "model", "--kinds", "a"), "plays one kind"),
+    (
+        ("--expert", "openai:m", "--decisions", "model", "--critic", "openai:r"),
+        "is for --decisions",
+    ),
+    (("--expert", "openai:m", "--critic", "r"), "not a model agent; give openai:MODEL"),
     (("--expert", "openai:m", "--writer", "x:Y"), "give --writer x:Y or --expert"),
     (("--expert", "openai:m", "--max-usd", "1"), "--max-usd needs prices"),
     (("--expert", "openai:m", "--set", "decide=json"), "leave decide out"),
@@ -242,5 +317,12 @@ def test_a_local_model_writes_or_is_stood_in_for(tmp_path: Path) -> None:
     assert problems(out, small().tasks) == []
     assert {each.writer for each in thoughts} == {"grounded"}  # it speaks at random
     assert all(len(each.refused) >= 3 for each in thoughts)
+    settings = AgentSettings.model_validate({"sees": "text", "sampling": {"max_tokens": 8}})
+    with closing(ModelSession(f"hf:{model}", reader_settings(settings), out)) as session:
+        critic = Critic(session.client)
+        one = trajectories(out)[0]
+        known = knowledge_at(one.turns, 0, instruction=one.instruction, language="en")
+        assert critic.check("How odd this is.", "planning", known, limit=9).refusals == ()
+    assert (critic.counts.asked, critic.counts.unread) == (1, 1)
     ledger = (out / "spending.jsonl").read_text().splitlines()
     assert sum(json.loads(line)["completion"] for line in ledger) > 0
