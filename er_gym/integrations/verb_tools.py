@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import Any
 
 from er_gym.tasks import verbs
+from er_gym.tasks.config_folder import config_directory
 from er_gym.tasks.reading import read_yaml
-from er_gym.tasks.suites import config_directory
 
 OBJECT = "object"
 """The name of the one argument, a type of object."""

@@ -25,7 +25,7 @@ from er_gym.data.critic import Refusal, Review, review
 from er_gym.data.knowledge import Knowledge
 from er_gym.data.trajectory import ThoughtKind
 from er_gym.rollout.agent import ModelReply
-from er_gym.tasks.suites import config_directory
+from er_gym.tasks.config_folder import config_directory
 
 READER = "reader"
 """The code of a refusal by the model; all other codes are the rules'."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Set as AbstractSet
+
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
@@ -200,7 +202,7 @@ def _rows(world: World, object_id: str, with_contents: bool) -> set[int]:
     return {i, *(world.inside(i) if with_contents else ())}
 
 
-def _show(world: World, unshown: set[int]) -> None:
+def _show(world: World, unshown: AbstractSet[int]) -> None:
     world.unshown = frozenset(i for i in unshown if world.types[i] != "Floor")
     world.state_changed()
 

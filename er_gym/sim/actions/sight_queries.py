@@ -94,12 +94,13 @@ def objects_visible_from_camera(
     visibilityScheme: str | None = None,
 ) -> list[str]:
     """The old name of GetVisibleObjects of a third-party camera."""
-    return get_visible_objects(
+    seen: list[str] = get_visible_objects(
         world,
         maxDistance=maxDistance,
         visibilityScheme=visibilityScheme,
         thirdPartyCameraIndex=thirdPartyCameraIndex,
     )
+    return seen
 
 
 @action("PositionsFromWhichItemIsInteractable")
@@ -153,7 +154,8 @@ def objects_visible_from_positions(
     world: World, *, positions: list[Vector] | None = None
 ) -> dict[str, list[list[float]]]:
     """For each object seen from a position and a quarter turn: x, y, z and rotation of each."""
-    agent, found = world.agent, {}
+    agent = world.agent
+    found: dict[str, list[list[float]]] = {}
     y = float(agent.position[1])
     for x, z in places_of(world, positions or None).tolist():
         for yaw in _QUARTERS:

@@ -54,5 +54,6 @@ def _piece(quads: Quads) -> Piece:
     # Both sides, since one looks at lines from anywhere.
     sides = np.array([(0, 1, 2), (0, 2, 3), (2, 1, 0), (3, 2, 0)])
     faces = (sides[None] + 4 * np.arange(len(quads))[:, None, None]).reshape(-1, 3)
-    kind = np.uint16 if len(vertices) < 65536 else np.uint32
-    return Piece("glowing", vertices, normals, faces.astype(kind))
+    small = len(vertices) < 65536
+    indices = faces.astype(np.uint16) if small else faces.astype(np.uint32)
+    return Piece("glowing", vertices, normals, indices)
