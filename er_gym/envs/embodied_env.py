@@ -86,6 +86,8 @@ class EmbodiedEnv(SavedEpisode, gymnasium.Env[dict[str, Any], Any]):
       each object in view.
     - ``state``: ``(D,)`` float32 in [-1, 1], see :data:`er_gym.envs.observations.STATE_LAYOUT`.
     - ``text``: the task, what the agent sees, holds and can do, and feedback, in words.
+    - ``anchor``: ``(16,)`` uint8, a digest of what the agent has observed and done so far, also in
+      hex as ``info["anchor"]`` (:func:`er_gym.envs.observations.anchor_of`).
     - an observation of another package, by name or as ``package.module:ROW`` (docs/extending.md).
 
     ## Info
