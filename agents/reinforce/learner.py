@@ -30,8 +30,7 @@ class Learner:
         accelerator: spreads the work over processes and devices.
         padding: a token that fills rows up.
         multiple: of the length of batches.
-        rounded: whether it is multiplied in bfloat16. What the sampler says of tokens, if it does,
-            is then not near enough to what the network says, and is computed again.
+        rounded: whether it is multiplied in bfloat16.
 
     Attributes:
         optimizer: with its state.
@@ -70,8 +69,7 @@ class Learner:
         for group in self.optimizer.param_groups:
             group["lr"] = rate_of(training, update)
         self._network.train()
-        unknown = any(np.isnan(row.scores).any() for row in rows)
-        if several and (self._rounded or unknown):
+        if several and any(np.isnan(row.scores).any() for row in rows):
             rows = self._scored_again(rows)
         told: dict[str, float] = defaultdict(float)
         norms: list[float] = []

@@ -12,21 +12,18 @@ class PlayingCopy:
     """A copy of a model to play with, which has the same weights in the same memory.
 
     The sampler puts its own attention and its settings of generation into the model that it is
-    given, so it gets a copy of everything else. Where weights learn in float32 and the model is
-    multiplied in bfloat16, the copy has its own in bfloat16, which :meth:`refresh` brings up to
-    date; an adapter's weights are shared in any case.
+    given, so it gets a copy of everything else.
 
     Args:
         network: the model that learns.
-        dtype: in which it is multiplied.
-        adapter: whether only an adapter on it learns.
+        rounded: whether the copy has weights of its own in bfloat16 where those that learn are in
+            float32; :meth:`refresh` brings them up to date.
 
     Attributes:
         network: the copy.
     """
 
-    def __init__(self, network: Any, dtype: str, *, adapter: bool) -> None:
-        rounded = dtype == "bfloat16" and not adapter
+    def __init__(self, network: Any, *, rounded: bool) -> None:
         self._pairs: list[tuple[torch.Tensor, torch.Tensor]] = []
         memo: dict[int, Any] = {}
         for weight in network.parameters():
