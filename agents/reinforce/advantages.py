@@ -143,3 +143,21 @@ def spread(group: Group) -> float:
     totals = [e.total for e in group]
     found = max(totals) - min(totals)
     return found if found > _LEAST_DEVIATION else 0.0
+
+
+def widest(group: Group, most: int) -> list[int]:
+    """The places of the episodes of a group that differ most in what they earned (PODS).
+
+    They are some of those that earned least and some of those that earned most: of all such
+    choices that with the greatest variance, and thus of all choices (arXiv 2504.13818).
+
+    Args:
+        group: the episodes.
+        most: how many; all places if the group has no more.
+    """
+    totals = [e.total for e in group]
+    order = sorted(range(len(totals)), key=totals.__getitem__)
+    if len(order) <= most:
+        return sorted(order)
+    choices = [order[:low] + order[len(order) - most + low :] for low in range(most + 1)]
+    return sorted(max(choices, key=lambda places: pstdev(totals[place] for place in places)))

@@ -83,6 +83,8 @@ class ObjectiveSettings(StrictSettings):
             ``episode`` (each turn or episode counts alike, however many words it has).
         skip_within: groups are left out whose episodes earned the same, or differ by no more than
             this; None to leave out none.
+        most: of how many episodes of a group is learnt, those that differ most in what they earned;
+            None for all. To learn from an episode takes about as long as to play it.
     """
 
     clip: float = Field(0.2, gt=0, lt=1)
@@ -91,6 +93,7 @@ class ObjectiveSettings(StrictSettings):
     entropy: float = Field(0.0, ge=-1_000, le=1_000)
     mean: Literal["token", "turn", "episode"] = "token"
     skip_within: float | None = Field(0.0, ge=0, le=1_000)
+    most: int | None = Field(None, ge=2, le=100_000)
 
 
 class TrainingSettings(StrictSettings):

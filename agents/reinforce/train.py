@@ -49,7 +49,7 @@ from agents.finetune.network import (
     with_learning_part,
 )
 from agents.finetune.run_files import LOGS, METRICS, RunFiles, replaced_folder
-from agents.reinforce.advantages import ADVANTAGES, spread
+from agents.reinforce.advantages import ADVANTAGES, spread, widest
 from agents.reinforce.branches import with_values
 from agents.reinforce.curriculum import chosen_tasks, with_results
 from agents.reinforce.episodes import Episode, scored
@@ -480,9 +480,11 @@ def _rows(
         skipped.append(float(row.compares and within is not None and spread(group) <= within))
         if skipped[-1]:
             continue
-        for episode, advantages in zip(members, row.of(group, settings.advantage), strict=True):
+        places = widest(group, objective.most or len(group))
+        some = [group[place] for place in places]
+        for place, advantages in zip(places, row.of(some, settings.advantage), strict=True):
             rows += rows_of(
-                episode.turns,
+                members[place].turns,
                 advantages,
                 objective.mean,
                 keep_all=bool(objective.entropy or objective.kl),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from agents.reinforce.advantages import ADVANTAGES, returns, spread
+from agents.reinforce.advantages import ADVANTAGES, returns, spread, widest
 from agents.reinforce.episodes import ScoredEpisode
 from agents.reinforce.settings import AdvantageSettings
 
@@ -43,6 +43,14 @@ def test_equal_episodes_have_no_advantage() -> None:
         assert ADVANTAGES.get(row).of(equal, AdvantageSettings()) == [[0.0], [0.0, 0.0]]
     assert spread(equal) == 0.0
     assert spread(GROUP) == 2.0
+
+
+def test_the_episodes_that_differ_most_are_learnt() -> None:
+    group = tuple(episode(each) for each in (1, 0, 1, 1, 0.9, 1))
+    assert sorted(group[place].total for place in widest(group, 2)) == [0, 1]
+    assert sorted(group[place].total for place in widest(group, 3)) == [0, 1, 1]
+    assert widest(GROUP, 3) == [1, 2, 3]  # 0, 0 and 2 rather than 0, 1 and 2
+    assert widest(GROUP, 9) == [0, 1, 2, 3]
 
 
 def test_steps_of_the_same_anchor_are_compared() -> None:

@@ -29,8 +29,8 @@ def settings(**more: Any) -> ReinforceSettings:
     told: dict[str, Any] = {
         "rewards": {"bandit:even_letters": 1.0},
         "model": {"dtype": "float32"},
-        "play": {"tasks": 1, "group": 12, "concurrency": 1},
-        "training": {"updates": 6, "learning_rate": 0.03, "save_every": 2, "batch": 16},
+        "play": {"tasks": 1, "group": 14, "concurrency": 1},
+        "training": {"updates": 5, "learning_rate": 0.06, "save_every": 2, "batch": 16},
     }
     for name, values in more.items():
         told[name] = {**told.get(name, {}), **values}
@@ -52,18 +52,18 @@ def whole(model: Path, suite: Suite, tmp_path_factory: pytest.TempPathFactory) -
 
 def test_what_it_earns_rises(whole: Path, model: Path) -> None:
     lines = curve(whole)
-    assert [line["update"] for line in lines] == [1, 2, 3, 4, 5, 6]
+    assert [line["update"] for line in lines] == [1, 2, 3, 4, 5]
     earned = [line["reward"] / line["turns"] for line in lines]
     assert earned[0] < 0.65
-    assert earned[-1] > 0.9
+    assert earned[-1] > 0.8
     assert lines[0]["reward/bandit:even_letters"] == lines[0]["reward"]
     # the chances at play are those that the learner computes
     assert max(line["sampler_gap"] for line in lines) < 1e-4
     made = open_model(whole)
     assert made.agent == open_model(model).agent
     [record] = made.history.runs
-    assert (record.updates, record.conversations) == (6, 72)
-    assert len(lines_of(whole / EPISODES)) == 72
+    assert (record.updates, record.conversations) == (5, 70)
+    assert len(lines_of(whole / EPISODES)) == 70
 
 
 def test_after_a_kill_it_goes_on_as_if_nothing_had_been(
