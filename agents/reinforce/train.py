@@ -4,6 +4,10 @@ Read it from top to bottom: :func:`reinforce` is the whole run. In each update t
 plays tasks of the suite, several times each, many conversations at once, with the model as it is.
 What each turn earned is compared (:mod:`agents.reinforce.advantages`), and the tokens that the
 model said in it become likelier or rarer (:mod:`agents.reinforce.objective`).
+
+TRL's ``GRPOTrainer`` takes a rollout function, too. It has one advantage for an episode, where ours
+has one for a turn; pads all conversations of an update to the longest; and computes the scores of
+all tokens after the first prompt, learnt or not (TRL 1.16; docs/reinforcement.md has the figures).
 """
 
 from __future__ import annotations
@@ -77,7 +81,7 @@ from agents.vlm.tuned_model import AGENT
 from er_gym.activity import begin
 from er_gym.rollout.env_pool import EnvPool
 from er_gym.rollout.run_directory import Manifest
-from er_gym.tasks.splits import EVALUATION_SCENES
+from er_gym.tasks.splits import TRAINING_SCENES
 from er_gym.tasks.suites import Suite, load_suite
 from er_gym.tasks.task import Task
 
@@ -421,7 +425,7 @@ def _greedy(agent: AgentSettings) -> AgentSettings:
 
 
 def _check_suite(suite: Suite, settings: ReinforceSettings) -> None:
-    kept = sorted({task.scene for task in suite.tasks} & {*EVALUATION_SCENES})
+    kept = sorted({task.scene for task in suite.tasks} - {*TRAINING_SCENES})
     if kept or suite.name == settings.validation.suite:
         why = f"plays in rooms that are kept for evaluation, such as {kept[0]}" if kept else (
             "is the one that validation chooses by"

@@ -84,7 +84,7 @@ def test_a_reinforcement_shows_success_and_each_reward(tmp_path, visit):
     told = {"model": "m", "suite": "train",
             "settings": {"training": {"updates": 8}, "advantage": {"row": "gigpo"}}}  # fmt: skip
     (folder / "reinforce.json").write_text(json.dumps(told))
-    lines: list[dict[str, Any]] = [
+    lines = [
         {"update": 0, "validation/success": 0.5},
         {"update": 1, "success": 0.25, "reward": 0.2, "reward/success": 0.25,
          "reward/repeated": -0.05, "success/single_search": 0.75},
