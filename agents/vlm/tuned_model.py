@@ -18,6 +18,11 @@ _AS_DRAWN = 1 << 24
 """Pixels; no drawn picture has more."""
 
 
+def is_model_run(folder: Path) -> bool:
+    """Whether a directory is that of a run that trains a language model."""
+    return any((folder / name).is_file() for name in _RUNS)
+
+
 def model_directory(path: str) -> str:
     """The directory of a model, given it or the run of ``er-gym finetune`` or ``er-gym reinforce``
     that made it.
