@@ -102,6 +102,7 @@ NEVER: Mapping[str, tuple[str, ...]] = {
         "docs/ladder.md: er-gym ablate",
         "docs/models.md: er-gym",
         "docs/reinforcement.md: er-gym",
+        "docs/reinforcement.md: OMP_NUM_THREADS",
         "docs/zoo.md: er-gym train-rl",
         "er_gym/tasks/data/train.md: er-gym tasks generate",
     ),

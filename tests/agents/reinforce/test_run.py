@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 from forked import SPAWNED
 
 from agents.finetune.model_files import open_model
@@ -17,6 +18,7 @@ from agents.reinforce import train as training
 from agents.reinforce.run_files import EPISODES
 from agents.reinforce.settings import ReinforceSettings
 from agents.reinforce.train import Result, reinforce
+from benchmarks.cli.main import cli
 from er_gym.resumable import FolderConflict
 from er_gym.rollout import processes
 from er_gym.tasks.suites import Suite, load_suite
@@ -132,6 +134,20 @@ def test_each_way_of_learning_runs(
     assert line["gradient_norm"] > 0
     assert (result.path / "model").is_dir()
     assert len(result.validation) == (2 if "validation" in more else 0)
+
+
+def test_the_command_says_what_cannot_learn(tmp_path: Path) -> None:
+    def said(*words: str) -> str:
+        told = ["reinforce", "--out", str(tmp_path / "run"), *words]
+        result = CliRunner().invoke(cli, told)
+        assert result.exit_code == 2
+        assert not (tmp_path / "run").exists()
+        return result.output
+
+    model = ("--model", "zoo:single-search", "--suite", "mini")
+    assert "zoo:single-search is a policy" in said("--config", "tiny", *model)
+    assert "er-tiny-text" in said("--config", "large", *model)
+    assert "training.updates" in said("--config", "tiny", *model, "--set", "training.updates=0")
 
 
 def test_what_does_not_go_together_is_refused(model: Path, suite: Suite, tmp_path: Path) -> None:
