@@ -25,7 +25,7 @@ from agents.rl.policy_file import (
     write_policy,
 )
 from agents.vlm.clients.merging import STAMP, merge
-from agents.vlm.tuned_model import RUN, model_directory
+from agents.vlm.tuned_model import is_model_run, model_directory
 from agents.zoo.card import Kind
 from agents.zoo.index import CARD, MOST_BYTES, SUFFIXES, files_of
 from er_gym.tasks.reading import parse_json, read_text
@@ -62,8 +62,8 @@ def pack(run: Path, folder: Path, dtype: str) -> Packed:
     """Write the files of a run's model into a folder.
 
     Args:
-        run: a run directory of ``er-gym train-rl`` or ``er-gym finetune``, or a language model's
-            directory.
+        run: a run directory of ``er-gym train-rl``, ``er-gym finetune`` or ``er-gym reinforce``, or
+            a language model's directory.
         folder: where to; it must exist.
         dtype: of the weights, one of :data:`DTYPES`.
 
@@ -75,7 +75,7 @@ def pack(run: Path, folder: Path, dtype: str) -> Packed:
     if (run / MODEL).is_file():
         kind, weights = "policy", folder / POLICY
         trained_on, made_by = _pack_policy(run, folder, dtype)
-    elif (run / RUN).is_file() or any((run / name).is_file() for name in _MODEL_CONFIGS):
+    elif is_model_run(run) or any((run / name).is_file() for name in _MODEL_CONFIGS):
         kind, weights = "language model", folder / WEIGHTS
         trained_on, made_by = _pack_language_model(run, folder, dtype), ()
     else:
@@ -256,4 +256,6 @@ def _without_place(run: Mapping[str, Any]) -> dict[str, Any]:
 
 def _stage(run: Mapping[str, Any]) -> str:
     stage = f"{run['stage']}: " if run["stage"] else ""
-    return f"{stage}{run['updates']:,} updates on {run['conversations']:,} conversations"
+    played = "advantage" in run["settings"]  # only a reinforcement run has such a setting
+    stage, on = ("reinforcement: ", "own episodes") if played else (stage, "conversations")
+    return f"{stage}{run['updates']:,} updates on {run['conversations']:,} {on}"

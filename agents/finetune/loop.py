@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import peft
 import safetensors.torch
 import torch
 import transformers
@@ -22,6 +21,7 @@ from torch.utils.tensorboard import SummaryWriter
 from agents.finetune import machine
 from agents.finetune.batches import EpochSampler
 from agents.finetune.model_files import History, ModelFiles, write_agent_files
+from agents.finetune.network import learning_part, put_back, save_network
 from agents.finetune.run_files import (
     LOGS,
     METRICS,
@@ -161,27 +161,15 @@ class FinetuneTrainer(transformers.Trainer):
         elif self.args.should_save:
             assert output_dir is not None
             os.makedirs(output_dir, exist_ok=True)
-            safetensors.torch.save_file(self._trained(), Path(output_dir) / TRAINED)
+            weights = learning_part(self.accelerator.unwrap_model(self.model))
+            safetensors.torch.save_file(weights, Path(output_dir) / TRAINED)
 
     def _load_from_checkpoint(self, resume_from_checkpoint: str, model: Any = None) -> None:
         if is_sharded(self.args):
             super()._load_from_checkpoint(resume_from_checkpoint, model)
             return
         there = safetensors.torch.load_file(Path(resume_from_checkpoint) / TRAINED)
-        trained = self._trained()
-        if there.keys() != trained.keys():
-            raise ValueError(f"{resume_from_checkpoint} does not fit the model; remove it")
-        with torch.no_grad():
-            for name, weight in trained.items():
-                weight.copy_(there[name])
-
-    def _trained(self) -> dict[str, torch.Tensor]:
-        network = self.accelerator.unwrap_model(self.model)
-        return {
-            name: weight.detach().contiguous()
-            for name, weight in network.named_parameters()
-            if weight.requires_grad
-        }
+        put_back(self.accelerator.unwrap_model(self.model), there, resume_from_checkpoint)
 
     def write_result(
         self, files: ModelFiles, history: History, agent: dict[str, Any], tokenizer: Any
@@ -194,12 +182,7 @@ class FinetuneTrainer(transformers.Trainer):
             if is_sharded(self.args):
                 super().save_model(str(folder), _internal_call=True)
             elif self.args.should_save:
-                network = self.accelerator.unwrap_model(self.model)
-                if isinstance(network, peft.PeftModel):
-                    network.save_pretrained(str(folder), save_embedding_layers=False)
-                else:
-                    network.config.use_cache = True
-                    network.to(files.config.dtype or torch.float32).save_pretrained(folder)
+                save_network(self.accelerator.unwrap_model(self.model), files, folder)
             if self.args.should_save:
                 for unneeded in ("training_args.bin", "README.md"):
                     (folder / unneeded).unlink(missing_ok=True)

@@ -103,20 +103,25 @@ class RunFiles:
 
     def metrics(self) -> list[dict[str, Any]]:
         """The whole lines of ``metrics.jsonl``."""
-        found = []
-        try:
-            lines = (self.path / METRICS).read_text(encoding="utf-8").splitlines()
-        except FileNotFoundError:
-            return []
-        for line in lines:
-            try:
-                found.append(json.loads(line))
-            except ValueError:  # a kill came while it was written
-                continue
-        return found
+        return lines_of(self.path / METRICS)
 
     def _all_checkpoints(self) -> list[Path]:
         return [each for each in self.checkpoints.glob("*") if _CHECKPOINT.fullmatch(each.name)]
+
+
+def lines_of(file: Path) -> list[dict[str, Any]]:
+    """The whole lines of a log; none if it is not there."""
+    found = []
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except FileNotFoundError:
+        return []
+    for line in lines:
+        try:
+            found.append(json.loads(line))
+        except ValueError:  # a kill came while it was written
+            continue
+    return found
 
 
 def draft_of(folder: Path) -> Path:

@@ -10,14 +10,12 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import peft
 import transformers
 from transformers.trainer_utils import set_seed
 
@@ -43,18 +41,21 @@ from agents.finetune.model_files import (
     open_model,
     settings_as_json,
 )
+from agents.finetune.network import (
+    chosen_dtype,
+    keep_learning_part_exact,
+    load_network,
+    with_learning_part,
+)
 from agents.finetune.optimizer import MuonAdamW
 from agents.finetune.run_files import FINETUNING, FinetuneManifest, RunFiles
 from agents.finetune.samples import Samples, open_samples
-from agents.finetune.settings import FinetuneSettings, Lora
+from agents.finetune.settings import FinetuneSettings
 from agents.finetune.tokens import EncodedChat, Encoder, check_lengths
-from agents.vlm.clients.adapters import adapter_chain, with_adapter
-from agents.vlm.clients.checkpoint import error_summary, load_weights
+from agents.vlm.clients.checkpoint import error_summary
 from agents.vlm.tuned_model import recorded_pictures
 from er_gym.activity import begin
 
-_EYES = {"vision": r"model\.visual\.(?!.*merger)", "projector": r"model\.visual\..*merger"}
-"""Names of the weights of each part that the settings can freeze."""
 _MOST_READERS = 8
 _CPU_LENGTHS = 32  # lengths of batches are multiples
 
@@ -172,9 +173,7 @@ def _train(
     say(_about(chats, samples))
 
     # -- devices: as the launcher, DeepSpeed or FSDP wants them; in bfloat16 where that is fast --
-    dtype = settings.model.dtype
-    if dtype == "auto":
-        dtype = "bfloat16" if machine.has_fast_bfloat16() else "float32"
+    dtype = chosen_dtype(settings.model)
     arguments = _arguments(settings, run, dtype)
     if settings.training.optimizer == "muon" and is_sharded(arguments):
         raise ValueError(
@@ -199,16 +198,12 @@ def _train(
     # adapter, weights that stay as they are are written again, so they are not rounded.
     as_they_are = settings.model.lora is None and dtype == "bfloat16" and not is_sharded(arguments)
     loaded = "float32" if arguments.fsdp else "auto" if as_they_are else dtype
-    network = _load(files, settings, loaded)
+    network = load_network(files, settings.model, loaded)
     if is_new:
         add_rows(network, tokenizer)
-    _freeze(network, settings)
-    if settings.model.lora is not None:
-        network = _with_lora(network, settings.model.lora, settings, files, tokenizer, feedback)
+    network = with_learning_part(network, settings.model, files, tokenizer, feedback)
     if dtype == "bfloat16" and not is_sharded(arguments):
-        for weight in network.parameters():
-            if weight.requires_grad:
-                weight.data = weight.data.float()  # small steps would be lost in bfloat16
+        keep_learning_part_exact(network)
 
     # -- the loop --
     if first:
@@ -349,67 +344,6 @@ def _about(chats: list[EncodedChat], samples: Samples) -> str:
         f"{len(chats):,} conversations, {pictures:,} pictures, {tokens:,} tokens, of which "
         f"{learnt:,} are learnt; the longest has {max(each.length for each in chats):,}{left}"
     )
-
-
-# -- the model -------------------------------------------------------------------------------------
-
-
-def _load(files: ModelFiles, settings: FinetuneSettings, dtype: str) -> Any:
-    """The model with its weights; adapters beneath are merged into it."""
-    try:
-        network, missing = load_weights(
-            files.base,
-            files.config,
-            dtype=dtype,
-            attn_implementation=settings.model.attention or None,
-            local_files_only=True,
-        )
-        for adapter in adapter_chain(files.path)[1]:
-            network = with_adapter(network, adapter, merge=True)
-    except Exception as error:  # what broken files make of the libraries can be any exception
-        raise ValueError(f"{files.path} cannot be loaded: {error_summary(error)}") from None
-    if missing:
-        raise ValueError(f"{files.base}: {missing}")
-    return network
-
-
-def _freeze(network: Any, settings: FinetuneSettings) -> None:
-    frozen = [re.compile(_EYES[part]) for part in settings.model.freeze]
-    for name, weight in network.named_parameters():
-        weight.requires_grad = not any(each.match(name) for each in frozen)
-
-
-def _with_lora(
-    network: Any,
-    lora: Lora,
-    settings: FinetuneSettings,
-    files: ModelFiles,
-    tokenizer: Any,
-    feedback: bool,
-) -> Any:
-    """The model with an adapter that learns, and with it the rows of ``<|feedback|>``."""
-    trained: dict[str, list[int]] | None = None
-    if feedback:
-        token = [tokenizer.convert_tokens_to_ids(FEEDBACK)]
-        trained = {"embed_tokens": token}
-        if not network.config.tie_word_embeddings:
-            trained["lm_head"] = token
-    frozen = "|".join(_EYES[part] for part in settings.model.freeze)
-    config = peft.LoraConfig(
-        task_type="CAUSAL_LM",
-        r=lora.rank,
-        lora_alpha=lora.alpha,
-        lora_dropout=lora.dropout,
-        target_modules=lora.targets if isinstance(lora.targets, str) else list(lora.targets),
-        exclude_modules=f"({frozen}).*" if files.has_vision and frozen else None,
-        trainable_token_indices=trained,
-    )
-    try:
-        network = peft.get_peft_model(network, config)
-    except ValueError as error:
-        raise ValueError(f"model.lora does not fit the model: {error_summary(error)}") from None
-    network.peft_config["default"].base_model_name_or_path = str(files.path)
-    return network
 
 
 def _to_nobody(text: str) -> None:

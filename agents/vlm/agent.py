@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -153,6 +154,18 @@ class VLMAgent:
         thought = "\n".join(f"{each.kind}: {each.text}" for each in parsed.thoughts)
         decided = action or _unreadable_action(parsed, said)
         return Decision(decided, thought, model_reply(reply), causes=causes)
+
+    def fork(self, client: Client | None = None, seed: int | None = None) -> VLMAgent:
+        """An agent with the same conversation so far, which goes on by itself.
+
+        Args:
+            client, seed: of the new agent; None for those of this one.
+        """
+        other = copy(self)
+        other._messages, other._rounds = [*self._messages], [*self._rounds]
+        other._client = self._client if client is None else client
+        other._seed = self._seed if seed is None else seed
+        return other
 
     @property
     def messages(self) -> Sequence[Message]:

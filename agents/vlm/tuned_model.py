@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-RUN = "finetune.json"
+RUN, REINFORCED = "finetune.json", "reinforce.json"
+_RUNS = {RUN: "fine-tuning run", REINFORCED: "reinforcement run"}
+"""What makes a model is known by a file in its directory."""
 MODEL = "model"
 AGENT = "agent.yaml"
 """In a model's directory: settings of a model agent, such as the prompts that it was tuned on."""
@@ -16,8 +18,14 @@ _AS_DRAWN = 1 << 24
 """Pixels; no drawn picture has more."""
 
 
+def is_model_run(folder: Path) -> bool:
+    """Whether a directory is that of a run that trains a language model."""
+    return any((folder / name).is_file() for name in _RUNS)
+
+
 def model_directory(path: str) -> str:
-    """The directory of a model, given it or the run of ``er-gym finetune`` that made it.
+    """The directory of a model, given it or the run of ``er-gym finetune`` or ``er-gym reinforce``
+    that made it.
 
     Any other path, or a model's name on a hub, stays as it is.
 
@@ -25,11 +33,12 @@ def model_directory(path: str) -> str:
         ValueError: the run is not finished.
     """
     run = Path(path)
-    if not (run / RUN).is_file():
+    noun = next((noun for name, noun in _RUNS.items() if (run / name).is_file()), None)
+    if noun is None:
         return path
     if not (run / MODEL).is_dir():
         raise ValueError(
-            f"{path} is a fine-tuning run that is not finished, so it has no model yet; run its "
+            f"{path} is a {noun} that is not finished, so it has no model yet; run its "
             "command again until it is"
         )
     return str(run / MODEL)

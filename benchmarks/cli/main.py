@@ -34,6 +34,7 @@ from benchmarks.cli.options import FOLDER, scorer_option
 from benchmarks.cli.player import player
 from benchmarks.cli.plugs import mcp, openenv
 from benchmarks.cli.prompts import prompts
+from benchmarks.cli.reinforce import reinforce
 from benchmarks.cli.render import play, render
 from benchmarks.cli.replay import replay
 from benchmarks.cli.serve import match_server, serve
@@ -119,6 +120,7 @@ cli.add_command(replay)
 cli.add_command(tasks)
 cli.add_command(train_rl)
 cli.add_command(finetune)
+cli.add_command(reinforce)
 cli.add_command(serve)
 cli.add_command(match_server)
 cli.add_command(inspect)

@@ -14,13 +14,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-Kind: TypeAlias = Literal["run", "collection", "ladder", "ablation", "finetuning", "policy"]
+Kind: TypeAlias = Literal[
+    "run", "collection", "ladder", "ablation", "finetuning", "reinforcement", "policy"
+]
 MARKERS: dict[str, Kind] = {
     "run.json": "run",
     "collection.json": "collection",
     "ladder.json": "ladder",
     "ablation.json": "ablation",
     "finetune.json": "finetuning",
+    "reinforce.json": "reinforcement",
     "curve.jsonl": "policy",
 }
 """The file by which a directory of each kind is known."""

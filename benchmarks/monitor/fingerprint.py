@@ -16,6 +16,7 @@ from er_gym.locking import LOCK
 _GROWING: Mapping[Kind, Sequence[str]] = {
     "policy": ("curve.jsonl", LOCK, "model.npz"),
     "finetuning": ("metrics.jsonl", "finetune.json", "model", LOCK),
+    "reinforcement": ("metrics.jsonl", "reinforce.json", "model", LOCK),
     "ladder": ("ladder.json", "result.json", LOCK),
     "ablation": ("ablation.json", "result.json", LOCK),
     "collection": ("collection.json", "trajectories.jsonl", "parts", LOCK),

@@ -24,8 +24,19 @@ _FRESH_SECONDS = 120.0
 """A log that grew so lately is taken to be growing, whoever writes it."""
 _MOST_KEPT = 32
 """The curves of no more runs are kept."""
-_OVER = {"policy": "steps", "finetuning": "update"}
-_LOG = {"policy": "curve.jsonl", "finetuning": "metrics.jsonl"}
+_OVER = {"policy": "steps", "finetuning": "update", "reinforcement": "update"}
+_LOG = {
+    "policy": "curve.jsonl",
+    "finetuning": "metrics.jsonl",
+    "reinforcement": "metrics.jsonl",
+}
+_MANIFESTS = {
+    "finetuning": ("finetune.json", ("model", "data", "settings")),
+    "reinforcement": ("reinforce.json", ("model", "suite", "settings")),
+}
+"""The file of a run of each kind that says what is made, and what of it a page shows."""
+_REWARD = "reward/"
+"""What the names of rewards begin with."""
 _TYPES = "success/"
 """What the names of figures by task type begin with."""
 
@@ -67,7 +78,7 @@ class Trained:
 
 
 def trained(directory: Directory, last: Mapping[str, Any] | None = None) -> Trained:
-    """A training run of the kind ``policy`` or ``finetuning``.
+    """A training run of the kind ``policy``, ``finetuning`` or ``reinforcement``.
 
     Args:
         directory: where it is.
@@ -120,10 +131,11 @@ def _settings(directory: Directory) -> tuple[dict[str, Any], str]:
         if directory.kind == "policy":
             told = read_yaml(directory.path / "config.yaml")
         else:
-            file = directory.path / "finetune.json"
+            name, shown = _MANIFESTS[directory.kind]
+            file = directory.path / name
             told = parse_json(read_text(file), file)
             if isinstance(told, dict):
-                told = {key: told.get(key) for key in ("model", "data", "settings")}
+                told = {key: told.get(key) for key in shown}
     except (TaskFileError, ValueError, OSError) as error:
         return {}, str(error).splitlines()[0]
     return (told, "") if isinstance(told, dict) else ({}, "its settings are no mapping")
@@ -138,6 +150,9 @@ def _told(
             name = str(settings["algorithm"]["name"])
             types = ", ".join(map(str, settings["env"]["types"]))
             return int(settings["total_steps"]), " · ".join(filter(None, (name, types)))
+        if directory.kind == "reinforcement":
+            chosen = settings["settings"]
+            return int(chosen["training"]["updates"]), str(chosen["advantage"]["row"])
         epochs = float(settings["settings"]["training"]["epochs"])
         stage = str(settings["settings"]["stage"] or "")
         epoch = float(last.get("epoch") or 0.0)
@@ -190,6 +205,31 @@ def finetuning_charts(tail: CurveTail, t: Translator) -> list[tuple[str, Any]]:
         (t(name), as_svg(name, Chart(t(name), updates, y, [Series(t(name), tail.points(name))])))
         for name, y in wanted
     ]
+    return [(title, picture) for title, picture in drawn if picture]
+
+
+def reinforcement_charts(tail: CurveTail, t: Translator) -> list[tuple[str, Any]]:
+    """The charts of a reinforcement, each with its title."""
+    updates = Axis(t("updates"), low=0.0)
+    success = [
+        Series(t("while_training"), tail.points("success", 100)),
+        Series(t("evaluation"), tail.points("validation/success", 100)),
+    ]
+    rewards = [Series(t("reward"), tail.points("reward"))] + [
+        Series(name.removeprefix(_REWARD), tail.points(name))
+        for name in tail.series
+        if name.startswith(_REWARD)
+    ]
+    wanted = (
+        ("success", Axis("%", 0.0, 100.0), success),
+        ("reward", Axis(""), rewards),
+        ("episode_length", Axis(t("steps"), low=0.0),
+         [Series(t("episode_length"), tail.points("turns"))]),
+        *((name, Axis("", low=0.0), [Series(t(name), tail.points(name))])
+          for name in ("entropy", "kl", "clipped", "gradient_norm", "learning_rate")),
+    )  # fmt: skip
+    drawn = [(t(name), as_svg(name, Chart(t(name), updates, y, lines)))
+             for name, y, lines in wanted]  # fmt: skip
     return [(title, picture) for title, picture in drawn if picture]
 
 

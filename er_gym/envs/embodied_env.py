@@ -88,6 +88,8 @@ class EmbodiedEnv(SavedEpisode, gymnasium.Env[dict[str, Any], Any]):
     - ``text``: the task, what the agent sees, holds and can do, and feedback, in words.
       ``text_task``, ``text_caption`` and ``text_targets`` tell less
       (:data:`er_gym.envs.observations.TEXTS`).
+    - ``anchor``: ``(16,)`` uint8, a digest of what the agent has observed and done so far, also in
+      hex as ``info["anchor"]`` (:func:`er_gym.envs.observations.anchor_of`).
     - an observation of another package, by name or as ``package.module:ROW`` (docs/extending.md).
 
     ## Info

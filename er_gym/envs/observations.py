@@ -11,6 +11,7 @@ import string
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import astuple, dataclass, field
 from functools import cached_property, partial
+from hashlib import blake2b
 from math import cos, radians, sin
 from typing import Any
 
@@ -372,6 +373,47 @@ def _object_views(situation: Situation) -> dict[str, Any]:
     return {"object_views": situation.perception.object_views, "object_views_around": around}
 
 
+ANCHOR_BYTES = 16
+
+
+def anchor_of(situation: Situation) -> bytes:
+    """A digest of what the agent has observed and done so far, :data:`ANCHOR_BYTES` long.
+
+    Agents that got the same instruction, know the same, stand in the same place, and whose last
+    action was the same with the same success, have the same anchor, whichever way they came and
+    however many steps it took. So what is earned from there on can be compared between episodes
+    (the anchor states of GiGPO, arXiv 2505.10978).
+    """
+    memory, perception = situation.memory, situation.perception
+    told = blake2b(digest_size=ANCHOR_BYTES)
+    told.update(
+        repr(
+            (
+                situation.instruction,
+                [round(each, 3) for each in _relative_pose(situation)],
+                perception.held_name,
+                situation.at,
+                situation.success,
+                memory.last and str(memory.last),
+                memory.repeats,
+            )
+        ).encode(errors="surrogatepass")
+    )
+    arrays = (
+        *(getattr(memory, name) for name in REMEMBERED),
+        situation.known.types,
+        perception.visible_types,
+        situation.available.interactable_types,
+    )
+    for array in arrays:
+        told.update(array.tobytes())
+    return told.digest()
+
+
+def _anchor(situation: Situation) -> NDArray[np.uint8]:
+    return np.frombuffer(anchor_of(situation), np.uint8).copy()
+
+
 def _nothing_to_tell(situation: Situation) -> Mapping[str, Any]:
     return {}
 
@@ -456,6 +498,11 @@ OBSERVATIONS: Registry[Observation] = Registry(
             )
             for name in TEXTS
         },
+        "anchor": Observation(
+            lambda width, height: spaces.Box(0, 255, (ANCHOR_BYTES,), np.uint8),
+            _anchor,
+            info=lambda situation: {"anchor": anchor_of(situation).hex()},
+        ),
     },
     expected=f"an {__name__}.Observation",
     fits=lambda row: isinstance(row, Observation),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 import re
 from collections.abc import Mapping
@@ -18,7 +17,6 @@ from er_gym.envs.actions import INDEX, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.errors import ResetNeeded
 from er_gym.envs.feedback_words import SAY
-from er_gym.envs.observations import FEATURE_ROW, FEATURES, SCALARS
 from er_gym.envs.sources import Source
 from er_gym.envs.wrappers import KeyActionShaping
 from er_gym.integrations.scaffold import DEFAULT, OBSERVATIONS, Scaffold
@@ -34,11 +32,6 @@ PROMPT = (
 _TAGGED = re.compile(r"<(action|answer|DecisionMaking)>(.*?)</\1>", re.IGNORECASE | re.DOTALL)
 _OVER = "The episode is over ({reason}); nothing more can be done in it."
 _CLOSED = "the session is closed: make a new one"
-_POSE = slice(SCALARS.index("standing") + 1)
-_SITUATION = tuple(
-    FEATURE_ROW[name]
-    for name in ("visible", "seen", "navigable", "interactable", "open", "on", "held")
-)
 
 
 def action_in(reply: str) -> str:
@@ -70,9 +63,8 @@ class Turn:
         terminated, truncated: as Gymnasium means them.
         success: whether the task is done; decided at the end, False before.
         is_action_valid: whether the text named an action that was legal.
-        anchor: equal for two turns of one task in which the agent stands in the same place, has
-            seen the same, and can do the same, whatever it did before: the state that GiGPO groups
-            steps by.
+        anchor: the task and :func:`~er_gym.envs.observations.anchor_of`, the state that GiGPO
+            groups steps by.
         progress: the share of the task's key actions that are done; for records, not for agents.
         task_id: the task's id.
         instruction: what the agent is asked to do.
@@ -129,7 +121,7 @@ class Session:
         self._text = OBSERVATIONS[self.scaffold.observation]
         if pictures is None:
             pictures = self.scaffold.observation == "picture"
-        kinds = (self._text, "state", *(["rgb"] if pictures else []))
+        kinds = (self._text, "anchor", *(["rgb"] if pictures else []))
         env: gymnasium.Env[Any, Any] = EmbodiedEnv(
             episode_source, obs_mode="+".join(kinds), **settings
         )
@@ -213,7 +205,7 @@ class Session:
             truncated=truncated,
             success=info["success"],
             is_action_valid=valid,
-            anchor=_anchor(info["task_id"], obs["state"]),
+            anchor=f"{info['task_id']}#{info['anchor']}",
             progress=done / max(done + left, 1),
             task_id=info["task_id"],
             instruction=info["instruction"],
@@ -222,9 +214,3 @@ class Session:
             end_reason=info["end_reason"],
         )
         return self._turn
-
-
-def _anchor(task_id: str, state: NDArray[np.float32]) -> str:
-    table = state[len(SCALARS) :].reshape(len(FEATURES), -1)
-    content = (state[_POSE].round(3) + 0.0).tobytes() + table[_SITUATION, :].tobytes()
-    return f"{task_id}#{hashlib.blake2b(content, digest_size=8).hexdigest()}"

@@ -16,6 +16,7 @@ from er_gym.envs.actions import Action
 from er_gym.rollout.env_worker import EnvLost, EnvWorker, request_to, result_of
 from er_gym.rollout.worker_backend import LOCAL_BACKEND, WorkerBackend
 from er_gym.rollout.worker_pool import WorkerSetupError
+from er_gym.tasks.task import Task
 
 __all__ = ["DEADLINE_SECONDS", "EnvLost", "EnvPool", "RemoteEnv"]
 
@@ -37,6 +38,7 @@ class EnvPool:
         worker_backend: where the processes run.
 
     Attributes:
+        slots: as above.
         closed: whether the ``with`` statement has ended, so that the processes end or have ended.
     """
 
@@ -51,7 +53,7 @@ class EnvPool:
     ) -> None:
         self.deadline = deadline
         self.closed = False
-        self._workers, self._slots = min(workers, slots), slots
+        self._workers, self.slots = min(workers, slots), slots
         self._kwargs, self._worker_backend = dict(env), worker_backend
         self._lock = threading.Lock()  # guards starting and ending processes
         self._team: list[EnvWorker] = []
@@ -91,7 +93,7 @@ class EnvPool:
         return env
 
     def _start(self, place: int) -> EnvWorker:
-        slots = range(place, self._slots, self._workers)
+        slots = range(place, self.slots, self._workers)
         return self._worker_backend.start_env_worker(slots, self._kwargs)
 
     def _close(self) -> None:
@@ -141,6 +143,18 @@ class RemoteEnv:
         self.details = {"task": self._task, **details}
         obs, reward, terminated, truncated, info = answer
         return obs, reward, terminated, truncated, info
+
+    def snapshot(self) -> bytes:
+        """The episode as it is now, as ``EmbodiedEnv.snapshot`` gives it."""
+        saved: bytes = self._ask("snapshot")
+        return saved
+
+    def restore(self, task: Task, snapshot: bytes) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Go on with the episode of a snapshot, which is of this task."""
+        self._task = task
+        obs, info, details = self._ask("restore", snapshot)
+        self.details = {"task": task, **details}
+        return obs, info
 
     @property
     def unwrapped(self) -> RemoteEnv:

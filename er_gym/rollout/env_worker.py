@@ -194,6 +194,13 @@ class _SlotEnv:
     def step(self, action: Action | str | int) -> Any:
         return *self._made.step(action), self._details()
 
+    def snapshot(self) -> bytes:
+        return self._made.snapshot()
+
+    def restore(self, snapshot: bytes) -> Any:
+        obs, info = self._made.restore(snapshot)
+        return obs, info, self._details()
+
     def _details(self) -> dict[str, Any]:
         """The details without the task, which the caller has already."""
         return {name: each for name, each in self._made.details.items() if name != "task"}

@@ -8,20 +8,16 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any
 
 from er_gym.rollout.agent import Agent, CannotGoOn, Decision, MakeAgent
 from er_gym.rollout.env_pool import EnvLost, EnvPool, RemoteEnv
-from er_gym.rollout.events import EventLog
-from er_gym.rollout.executor import (
-    Assignment,
-    EpisodeSettings,
-    PlayedEpisode,
-)
-from er_gym.rollout.play import error_with_location, play_episode
+from er_gym.rollout.events import EventListener, EventLog, ignore_event
+from er_gym.rollout.executor import Assignment, EpisodeSettings, EpisodeSink, PlayedEpisode
+from er_gym.rollout.play import Playable, error_with_location, play_episode
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.worker_pool import LostJob
 from er_gym.tasks.task import Task
@@ -37,45 +33,69 @@ def play_in_threads(assigned: Assignment) -> None:
     waits for the replies under way. Episodes that these replies do not finish leave no record. At
     Ctrl-C the run waits for nothing.
     """
-    directory, parallelism, sink = assigned.directory, assigned.parallelism, assigned.sink
-    todo = deque(assigned.tasks)
-    slots = talking = min(parallelism.concurrency, len(todo))
-    stopped: CannotGoOn | None = None
-    env = directory.manifest.env
+    directory, parallelism = assigned.directory, assigned.parallelism
+    slots = min(parallelism.concurrency, len(assigned.tasks))
     with (
         EnvPool(
             parallelism.workers,
             slots,
-            env,
+            directory.manifest.env,
             deadline=parallelism.deadline,
             worker_backend=parallelism.worker_backend,
         ) as pool,
         closing(EventLog(directory.path)) as events,
     ):
-        threads = _ThreadedRun(assigned.episodes, pool, assigned.make_agent, events, todo)
-        try:
-            for slot in range(slots):
-                # Daemon threads: one that waits for a reply must not keep the process from ending.
-                threading.Thread(target=threads.play_all, args=(slot,), daemon=True).start()
-            while talking:
-                threads.unhandled.acquire()
-                result = threads.results[0]
-                if isinstance(result, PlayedEpisode):
-                    sink.save(result)
-                    sink.ended(result)
-                elif result is None:
-                    talking -= 1
-                elif isinstance(result, CannotGoOn):
-                    stopped = stopped or result
-                else:
-                    raise result
-                threads.results.popleft()
-        finally:
-            threads.stopping.set()
-            # Save what is over, also the episode whose saving Ctrl-C interrupted.
-            for result in tuple(threads.results):
-                if isinstance(result, PlayedEpisode):
-                    sink.save(result)
+        play_in_pool(
+            pool, assigned.episodes, assigned.tasks, assigned.make_agent, assigned.sink, events
+        )
+
+
+def play_in_pool(
+    pool: EnvPool,
+    episodes: EpisodeSettings,
+    tasks: Sequence[Task],
+    make_agent: MakeAgent,
+    sink: EpisodeSink,
+    events: EventListener = ignore_event,
+    dress: Callable[[RemoteEnv, Task], Playable] = lambda env, task: env,
+) -> None:
+    """Play tasks in a pool that stays open, as many at once as it has slots.
+
+    Args:
+        pool: the environments.
+        episodes: what the episodes have in common.
+        tasks: one episode is played of each; no two have the same id.
+        make_agent, sink: see :class:`.executor.Assignment`.
+        events: called with the steps and replies, in many threads.
+        dress: puts something around a slot's environment for the episode of a task.
+    """
+    todo = deque(tasks)
+    talking = min(pool.slots, len(todo))
+    stopped: CannotGoOn | None = None
+    threads = _ThreadedRun(episodes, pool, make_agent, events, dress, todo)
+    try:
+        for slot in range(talking):
+            # Daemon threads: one that waits for a reply must not keep the process from ending.
+            threading.Thread(target=threads.play_all, args=(slot,), daemon=True).start()
+        while talking:
+            threads.unhandled.acquire()
+            result = threads.results[0]
+            if isinstance(result, PlayedEpisode):
+                sink.save(result)
+                sink.ended(result)
+            elif result is None:
+                talking -= 1
+            elif isinstance(result, CannotGoOn):
+                stopped = stopped or result
+            else:
+                raise result
+            threads.results.popleft()
+    finally:
+        threads.stopping.set()
+        # Save what is over, also the episode whose saving Ctrl-C interrupted.
+        for result in tuple(threads.results):
+            if isinstance(result, PlayedEpisode):
+                sink.save(result)
     if stopped is not None:
         raise stopped
 
@@ -99,7 +119,8 @@ class _ThreadedRun:
     settings: EpisodeSettings
     pool: EnvPool
     make_agent: MakeAgent
-    events: EventLog
+    events: EventListener
+    dress: Callable[[RemoteEnv, Task], Playable]
     todo: deque[Task]
     results: deque[PlayedEpisode | BaseException | None] = field(default_factory=deque)
     unhandled: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
@@ -163,7 +184,7 @@ class _ThreadedRun:
         except (Exception, SystemExit) as error:  # it must not end the run, as in play_episode
             return None, self.settings.unbegun(task, error_with_location(error))
         record = play_episode(
-            env,
+            self.dress(env, task),
             player,
             task,
             seed,

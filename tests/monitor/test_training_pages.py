@@ -78,6 +78,30 @@ def test_a_policy_shows_training_and_evaluation(tmp_path, visit):
     assert "single_search 25.0 %" in said(text)
 
 
+def test_a_reinforcement_shows_success_and_each_reward(tmp_path, visit):
+    folder = tmp_path / "learning"
+    folder.mkdir()
+    told = {"model": "m", "suite": "train",
+            "settings": {"training": {"updates": 8}, "advantage": {"row": "gigpo"}}}  # fmt: skip
+    (folder / "reinforce.json").write_text(json.dumps(told))
+    lines = [
+        {"update": 0, "validation/success": 0.5},
+        {"update": 1, "success": 0.25, "reward": 0.2, "reward/success": 0.25,
+         "reward/repeated": -0.05, "success/single_search": 0.75},
+    ]  # fmt: skip
+    (folder / "metrics.jsonl").write_text("".join(json.dumps(each) + "\n" for each in lines))
+    client = visit(tmp_path)
+    text = page(client, tmp_path, "learning")
+    assert "1 / 8" in said(text)
+    assert "Success, while it trains 25.0 %" in said(text)
+    assert "Success, evaluation 50.0 %" in said(text)
+    assert "repeated: 1, -0.05" in text  # the chart's description
+    assert "single_search 75.0 %" in said(text)
+    assert "learning Reinforcement gigpo" in said(client.get("/training").text)
+    (folder / "model").mkdir()
+    assert "finished" in said(page(client, tmp_path, "learning"))
+
+
 def test_a_ladder_shows_its_phases_and_the_success_of_each_rung(tmp_path, visit, runs):
     root = tmp_path / "ladder"
     root.mkdir()

@@ -146,6 +146,21 @@ def test_the_environment_is_kept_until_it_is_closed(engines, task):
     began(engines, 3, task).step("observe")
 
 
+def test_an_episode_goes_on_from_a_snapshot_in_another_slot(engines, task):
+    one, other = began(engines, 3, task), engines.env(2)
+    one.step("observe")
+    saved = one.snapshot()
+    _, info = other.restore(task, saved)
+    assert (info["action"], other.details["task"]) == ("observe", task)
+    expected, *_ = one.step("move forward")
+    found, *_ = other.step("move forward")
+    assert {name: str(each) for name, each in found.items()} == {
+        name: str(each) for name, each in expected.items()
+    }
+    one.close()
+    other.close()
+
+
 # -- what goes wrong in it -----------------------------------------------------------------------
 
 

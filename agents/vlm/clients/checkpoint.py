@@ -99,6 +99,27 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
         )
         if missing:
             raise ValueError(missing)
+    ends = _prepare(model, tokenizer, settings)
+    for number, adapter in enumerate(adapters, 1):
+        with _errors_summarised(f"the adapter {adapter} does not fit the model"):
+            model = with_adapter(model, adapter, merge=number < len(adapters))
+    identity = _identity(base, adapters, settings, model)
+    return Checkpoint(model.eval(), tokenizer, image_processor, template, ends, identity)
+
+
+def checkpoint_in_memory(
+    model: Any, tokenizer: Any, image_processor: Any, template: str, settings: AgentSettings
+) -> Checkpoint:
+    """A model that is in memory already, such as one that is being trained, ready to chat.
+
+    Its replies depend on weights that may change, so it has no ``identity``.
+    """
+    ends = _prepare(model, tokenizer, settings)
+    return Checkpoint(model.eval(), tokenizer, image_processor, template, ends, identity="")
+
+
+def _prepare(model: Any, tokenizer: Any, settings: AgentSettings) -> frozenset[int]:
+    """Let a model generate by the settings; gives the tokens that end a reply."""
     ends, pad = _end_tokens(model, tokenizer), tokenizer.pad_token_id
     model.generation_config = transformers.GenerationConfig(
         do_sample=False,
@@ -107,11 +128,7 @@ def load(path: str, settings: AgentSettings) -> Checkpoint:
         pad_token_id=min(ends, default=None) if pad is None else pad,
         repetition_penalty=model.generation_config.repetition_penalty,
     )
-    for number, adapter in enumerate(adapters, 1):
-        with _errors_summarised(f"the adapter {adapter} does not fit the model"):
-            model = with_adapter(model, adapter, merge=number < len(adapters))
-    identity = _identity(base, adapters, settings, model)
-    return Checkpoint(model.eval(), tokenizer, image_processor, template, ends, identity)
+    return ends
 
 
 def template_of(path: str, **where: bool) -> str | None:

@@ -14,7 +14,7 @@ import threading
 import time
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jinja2
@@ -30,7 +30,7 @@ from agents.vlm.chat import (
     template_message,
 )
 from agents.vlm.clients.batching import CLOSED, SteppedJobs, batches
-from agents.vlm.clients.checkpoint import error_summary, load
+from agents.vlm.clients.checkpoint import Checkpoint, error_summary, load
 from agents.vlm.clients.kv_cache import (
     CachedTurns,
     ConversationCache,
@@ -51,6 +51,24 @@ _THINK, _THOUGHT = "<think>", "</think>"
 _SHORT = 32  # tokens
 
 
+@dataclass(frozen=True)
+class Spoken:
+    """A reply in tokens, for those who train the model that says it.
+
+    Attributes:
+        reply: the reply.
+        prompt: the tokens that the model was given.
+        said: the tokens of the reply, the one that ends it included.
+        scores: (said,) the logarithm of the probability with which each was drawn; empty where that
+            is not known.
+    """
+
+    reply: Reply
+    prompt: Sequence[int]
+    said: Sequence[int]
+    scores: Sequence[float] = ()
+
+
 class LocalClient:
     """Generates replies with a model in this process.
 
@@ -68,6 +86,9 @@ class LocalClient:
         settings: the agent's settings.
         supervisor: the run's request supervisor; a reply stops when its minutes are over. By
             default there is no limit.
+        loaded: the model, where it is in memory already, as while it is trained; ``path`` is then
+            only its name. Whoever changes its weights calls :meth:`forget`.
+        scored: whether :meth:`spoken` says how likely each token was, where that is known.
 
     Attributes:
         identity: everything that the replies depend on, as JSON.
@@ -78,7 +99,13 @@ class LocalClient:
     """
 
     def __init__(
-        self, path: str, settings: AgentSettings, supervisor: RequestSupervisor | None = None
+        self,
+        path: str,
+        settings: AgentSettings,
+        supervisor: RequestSupervisor | None = None,
+        *,
+        loaded: Checkpoint | None = None,
+        scored: bool = False,
     ) -> None:
         if settings.decide == "tools":
             raise ValueError(
@@ -89,7 +116,8 @@ class LocalClient:
             settings,
             supervisor or RequestSupervisor(),
         )
-        loaded = load(path, settings)
+        loaded = loaded or load(path, settings)
+        self._scored = scored
         self.identity = loaded.identity
         self._model, self._end_tokens = loaded.model, loaded.end_tokens
         self._tokenizer, self._template, self._image_processor = (
@@ -110,10 +138,12 @@ class LocalClient:
         memory = memory_for(self._model) if local.reuse else 0
         self._kept = ConversationCache(memory) if memory else None
         self._packed: PackedModel | None = None
-        self._jobs: SteppedJobs[EncodedPrompt, Any, Reply]
+        self._jobs: SteppedJobs[EncodedPrompt, Any, Spoken]
         if self._kept is not None and can_be_packed(self._model):
             self._packed = PackedModel(
-                self._model, self._image_token if loaded.image_processor else None
+                self._model,
+                self._image_token if loaded.image_processor else None,
+                settings.sampling,
             )
             self._jobs = SteppedJobs(self._begun, self._next_tokens, self._ended, local.batch)
         else:
@@ -131,19 +161,28 @@ class LocalClient:
             CannotGoOn: the model's chat template does not take such conversations, the device
                 fails, or :meth:`close` has been called.
         """
+        return self.spoken(messages, seed).reply
+
+    def spoken(self, messages: Sequence[Message], seed: int) -> Spoken:
+        """The model's next turn with its tokens; as :meth:`reply`."""
         if self._closing.is_set():
             raise CannotGoOn(CLOSED.message)
         start = time.monotonic()
-        reply = self._jobs.do(self._row(messages, seed))
-        return replace(reply, seconds=time.monotonic() - start)
+        spoken = self._jobs.do(self._row(messages, seed))
+        return replace(spoken, reply=replace(spoken.reply, seconds=time.monotonic() - start))
+
+    def forget(self) -> None:
+        """Drop what is kept of conversations: memory is short, or the model's weights are others
+        now."""
+        if self._kept is not None:
+            self._kept.clear()
 
     def close(self) -> None:
         """Stop at the next token and release the model; waiting callers get CannotGoOn."""
         self._closing.set()
         self._jobs.close()
         self._model = None
-        if self._kept is not None:
-            self._kept.clear()
+        self.forget()
 
     # -- conversation to tokens, in the caller's thread ------------------------------------------
 
@@ -271,7 +310,7 @@ class LocalClient:
     # -- tokens to replies, in the thread of the jobs: on a CPU, step by step --------------------
 
     def _begun(self, prompt: EncodedPrompt) -> PackedRow:
-        return PackedRow(prompt, self._settings.sampling)
+        return PackedRow(prompt, self._settings.sampling, scored=self._scored)
 
     def _next_tokens(self, rows: Sequence[PackedRow]) -> None:
         assert self._packed is not None
@@ -279,25 +318,25 @@ class LocalClient:
         try:
             self._packed.step(rows)
         except RuntimeError as error:
-            self._forget()
+            self.forget()
             raise _explained(error, [row.prompt for row in rows]) from None
 
-    def _ended(self, row: PackedRow) -> Reply | None:
+    def _ended(self, row: PackedRow) -> Spoken | None:
         """The reply, once it has ended."""
         full = len(row.said) == self._settings.sampling.max_tokens
         if not (full or (row.said and row.said[-1] in self._end_tokens)):
             return None
         if self._kept is not None:
             self._kept.keep(row.prompt.name, row.turns())
-        return self._reply(row.prompt, row.said)
+        return self._reply(row.prompt, row.said, row.scores)
 
     # -- elsewhere, in whole batches ---------------------------------------------------------------
 
-    def _replies(self, rows: Sequence[EncodedPrompt]) -> list[Reply]:
+    def _replies(self, rows: Sequence[EncodedPrompt]) -> list[Spoken]:
         try:
             generated = self._generate(rows)
         except RuntimeError as error:
-            self._forget()
+            self.forget()
             raise _explained(error, rows) from None
         self._go_on()
         return [self._reply(row, said) for row, said in zip(rows, generated, strict=True)]
@@ -308,11 +347,6 @@ class LocalClient:
             raise CannotGoOn(CLOSED.message)
         if self._supervisor.over:
             raise CannotGoOn(f"the minutes are over; {AGAIN}")
-
-    def _forget(self) -> None:
-        """Give memory back, which may be short."""
-        if self._kept is not None:
-            self._kept.clear()
 
     def _generate(self, rows: Sequence[EncodedPrompt]) -> list[list[int]]:
         """The tokens that the model generates for each row, up to an end token or the limit."""
@@ -385,13 +419,15 @@ class LocalClient:
         ends = (place for place, each in enumerate(said, start=1) if each in self._end_tokens)
         return said[: next(ends, None)]
 
-    def _reply(self, row: EncodedPrompt, said: Sequence[int]) -> Reply:
+    def _reply(
+        self, row: EncodedPrompt, said: Sequence[int], scores: Sequence[float] = ()
+    ) -> Spoken:
         with self._tokenizer_lock:
             text = self._tokenizer.decode(
                 said, skip_special_tokens=True, clean_up_tokenization_spaces=False
             )
         thought, text = _without_thought(text, row.thinking)
-        return Reply(
+        reply = Reply(
             text=text,
             reasoning=thought,
             usage=Usage(
@@ -403,6 +439,7 @@ class LocalClient:
             finish="stop" if said[-1] in self._end_tokens else "length",
             model=self._name,
         )
+        return Spoken(reply, row.ids, said, scores)
 
     def _ids(self, text: str) -> list[int]:
         with self._tokenizer_lock:

@@ -21,7 +21,7 @@ from transformers import AttentionInterface
 
 from agents.vlm.clients.kv_cache import CachedTurns, grown, positions_of, whole_model
 from agents.vlm.clients.padded_batch import EncodedPrompt, new_pictures
-from agents.vlm.clients.seeded_sampling import SeededSampling
+from agents.vlm.clients.seeded_sampling import SampledScores, with_noise
 from agents.vlm.settings import Sampling
 
 _NAME = "er_gym_packed_rows"
@@ -36,21 +36,24 @@ class PackedRow:
     Args:
         prompt: the conversation.
         sampling: how tokens are drawn.
+        scored: whether to keep how likely each token of the reply was.
 
     Attributes:
         prompt: as above.
         said: the tokens of the reply so far.
+        scores: the logarithm of the probability with which each was drawn, if ``scored``.
         done: how many tokens have been processed.
-        draw: draws a token from scores, (1, words); None for the likeliest.
+        source: of the random numbers by which tokens are drawn; None for the likeliest.
     """
 
-    def __init__(self, prompt: EncodedPrompt, sampling: Sampling) -> None:
-        self.prompt = prompt
+    def __init__(self, prompt: EncodedPrompt, sampling: Sampling, *, scored: bool = False) -> None:
+        self.prompt, self.scored = prompt, scored
         self.said: list[int] = []
+        self.scores: list[float] = []
         self.done = prompt.reused
-        self.draw: SeededSampling | None = None
+        self.source: torch.Generator | None = None
         if sampling.temperature > 0:
-            self.draw = SeededSampling(sampling.temperature, sampling.top_p, [prompt.seed])
+            self.source = torch.Generator().manual_seed(prompt.seed)
         self._most = len(prompt.ids) + sampling.max_tokens
         self._layers = list(prompt.kept.layers) if prompt.kept is not None else []
         self._after_prompt = torch.empty(0)
@@ -107,10 +110,12 @@ class PackedModel:
     Args:
         model: the model; its attention is replaced.
         image_token: the token of a picture; None for a model without pictures.
+        sampling: how tokens are drawn, the same for all rows.
     """
 
-    def __init__(self, model: Any, image_token: int | None) -> None:
+    def __init__(self, model: Any, image_token: int | None, sampling: Sampling) -> None:
         self._model, self._image_token = model, image_token
+        self._sampled = SampledScores(sampling.temperature or 1.0, sampling.top_p)
         whole = whole_model(model)
         if image_token is None:
             whole.set_attn_implementation(_NAME)
@@ -129,20 +134,22 @@ class PackedModel:
             scores = self._model(**self._inputs(rows, new)).logits[0].float()  # (rows, words)
         for row, tokens in zip(rows, new, strict=True):
             row.done += len(tokens)
-        likeliest = scores.argmax(dim=1).tolist()
-        for number, row in enumerate(rows):
-            token = likeliest[number]
-            if self._penalty is not None or row.draw is not None:
-                token = self._drawn(row, scores[number : number + 1])
-            row.said.append(token)
-
-    def _drawn(self, row: PackedRow, scores: torch.Tensor) -> int:
-        ids = torch.tensor([row.prompt.ids + row.said])
         if self._penalty is not None:
-            scores = self._penalty(ids, scores)
-        if row.draw is not None:
-            scores = row.draw(ids, scores)
-        return int(scores.argmax())
+            said = [torch.tensor([row.prompt.ids + row.said]) for row in rows]
+            parts = zip(said, scores.split(1), strict=True)
+            scores = torch.cat([self._penalty(ids, one) for ids, one in parts])
+        noisy = scores
+        sources = [row.source for row in rows if row.source is not None]
+        if sources:  # all rows are drawn alike
+            scores = self._sampled(scores)
+            noisy = with_noise(scores, sources)
+        drawn = noisy.argmax(dim=1)
+        for row, token in zip(rows, drawn.tolist(), strict=True):
+            row.said.append(token)
+        if rows[0].scored:
+            chances = scores.log_softmax(dim=1).gather(1, drawn[:, None])[:, 0]
+            for row, chance in zip(rows, chances.tolist(), strict=True):
+                row.scores.append(chance)
 
     def _inputs(self, rows: Sequence[PackedRow], new: Sequence[Sequence[int]]) -> dict[str, Any]:
         ids = torch.tensor([[token for tokens in new for token in tokens]])

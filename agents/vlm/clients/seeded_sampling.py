@@ -18,19 +18,35 @@ class SeededSampling:
     """
 
     def __init__(self, temperature: float, top_p: float, seeds: Sequence[int]) -> None:
-        self._temperature = temperature
-        self._likeliest = transformers.TopPLogitsWarper(top_p) if top_p < 1 else None
+        self._sampled = SampledScores(temperature, top_p)
         self._seeds = seeds
         self._sources: list[torch.Generator] = []
 
     def __call__(self, input_ids: torch.Tensor, scores: torch.Tensor) -> torch.Tensor:
         """Scores with noise; both (rows, words)."""
-        scores = scores / self._temperature
-        if self._likeliest is not None:
-            scores = self._likeliest(input_ids, scores)
         if not self._sources:  # the device is known only now
             self._sources = [torch.Generator(scores.device).manual_seed(s) for s in self._seeds]
-        noise = torch.empty_like(scores)
-        for row, source in zip(noise, self._sources, strict=True):
-            row.exponential_(generator=source)
-        return scores - noise.log()
+        return with_noise(self._sampled(scores), self._sources)
+
+
+class SampledScores:
+    """The scores from which tokens are drawn: by the temperature, of the likeliest words alone."""
+
+    def __init__(self, temperature: float, top_p: float) -> None:
+        self._temperature = temperature
+        self._likeliest = transformers.TopPLogitsWarper(top_p) if top_p < 1 else None
+
+    def __call__(self, scores: torch.Tensor) -> torch.Tensor:
+        """Both (rows, words)."""
+        scores = scores / self._temperature
+        if self._likeliest is not None:
+            scores = self._likeliest(None, scores)
+        return scores
+
+
+def with_noise(scores: torch.Tensor, sources: Sequence[torch.Generator]) -> torch.Tensor:
+    """Scores, (rows, words), with Gumbel noise from each row's own generator."""
+    noise = torch.empty_like(scores)
+    for row, source in zip(noise, sources, strict=True):
+        row.exponential_(generator=source)
+    return scores - noise.log()

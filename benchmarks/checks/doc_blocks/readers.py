@@ -30,6 +30,14 @@ def _recipes(text: str, folder: Path) -> None:
         raise ValueError(f"{shipped} has another recipe {recipe.name}")
 
 
+def _rewards(text: str, folder: Path) -> None:
+    import yaml
+
+    from agents.reinforce.settings import ReinforceSettings
+
+    ReinforceSettings.model_validate(yaml.safe_load(text))
+
+
 def _cluster(text: str, folder: Path) -> None:
     """KubeRay's own reader is not here, so this is only read as YAML, and its version compared."""
     from importlib.metadata import PackageNotFoundError, version
@@ -82,6 +90,7 @@ READERS: Mapping[str, Callable[[str, Path], None]] = {
     "docs/agents.md: <Observation>": _reply,
     "docs/cluster.md: apiVersion": _cluster,
     "docs/extending.md: [project.entry-points": _entry_points,
+    "docs/reinforcement.md: rewards:": _rewards,
     "docs/serving.md: server:": _settings,
     "docs/tasks.md: - name:": _recipes,
 }

@@ -15,12 +15,17 @@ from benchmarks.monitor.training_view import (
     curves,
     finetuning_charts,
     policy_charts,
+    reinforcement_charts,
     trained,
 )
 from er_gym.tasks.types import GROUPS
 
 _PLANS = ("ladder", "ablation")
-_CHARTS = {"policy": policy_charts, "finetuning": finetuning_charts}
+_CHARTS = {
+    "policy": policy_charts,
+    "finetuning": finetuning_charts,
+    "reinforcement": reinforcement_charts,
+}
 
 
 class TrainingPages:
@@ -52,7 +57,7 @@ class TrainingPages:
         return self._site.show(request, "training.html", variables)
 
     def one(self, request: Request, id: str) -> Response:
-        """A policy, a fine-tuning, a ladder or an ablation."""
+        """A policy, a fine-tuning, a reinforcement, a ladder or an ablation."""
         directory = self._site.directories.get(id)
         if directory is not None and directory.kind in _PLANS:
             return self._show_plan(request, directory)

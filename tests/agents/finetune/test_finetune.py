@@ -364,7 +364,7 @@ def test_memory_that_is_not_there_is_told_before_loading(
     monkeypatch.setattr("agents.finetune.machine.free_memory", lambda: 1 << 20)
     made = settings("training.epochs=1")
     with monkeypatch.context() as patch:
-        patch.setattr(training, "_load", None)
+        patch.setattr(training, "load_network", None)
         with pytest.raises(ValueError, match=r"take about .* GiB .* 1 MiB of memory are free; set"):
             train(made, models("qwen2"), [blind.path], tmp_path / "run")
     assert not (tmp_path / "run").exists()

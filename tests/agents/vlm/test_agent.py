@@ -145,6 +145,19 @@ def test_sent_messages_never_change(env: Callable[..., EmbodiedEnv]) -> None:
     assert len(pictures(script.sent[-1])) == len(script.sent)
 
 
+def test_a_fork_goes_on_by_itself(env: Callable[..., EmbodiedEnv]) -> None:
+    played = env()
+    agent = agent_of(ScriptedClient(Script(*decided("observe", "move forward"))), settings())
+    obs, info = played.reset(options={"task": PICKUP})
+    agent.reset(PICKUP, obs, info)
+    obs, _, _, _, info = played.step(agent.act(obs, info).action)
+    fork = agent.fork(ScriptedClient(Script(*decided("end"))), seed=1)
+    assert str(fork.act(obs, info).action) == "end"
+    assert str(agent.act(obs, info).action) == "move forward"
+    assert fork.messages[:-1] == agent.messages[:-1]
+    assert len(fork.rounds) == len(agent.rounds) == 2
+
+
 def test_observing_shows_all_sides(env: Callable[..., EmbodiedEnv]) -> None:
     script = Script(*decided("observe", "end"))
     play(env("rgb"), script, settings(sees="pictures"))

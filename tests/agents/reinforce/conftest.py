@@ -1,0 +1,51 @@
+"""A tiny language model with random weights, and how it converses."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import yaml
+
+sys.path.append(str(Path(__file__).parent))  # for the helpers beside it
+sys.path.append(str(Path(__file__).parents[1] / "vlm"))  # for tiny_qwen
+
+pytest.importorskip("torch", reason="needs the extra finetune")
+pytest.importorskip("transformers", reason="needs the extra finetune")
+pytest.importorskip("peft", reason="needs the extra finetune")
+pytest.importorskip("tensorboard", reason="needs the extra finetune")
+
+from support import one_torch_thread
+from tiny_qwen import make_tiny_qwen
+
+from er_gym.tasks.splits import EVALUATION_SCENES
+from er_gym.tasks.suites import Suite, load_suite
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread() -> Iterator[None]:
+    with one_torch_thread():
+        yield
+
+
+@pytest.fixture(scope="session")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """It says three letters."""
+    made = make_tiny_qwen(tmp_path_factory.mktemp("reinforce") / "model", family="qwen2")
+    told = json.loads((made / "generation_config.json").read_text()) | {"repetition_penalty": 1.0}
+    (made / "generation_config.json").write_text(json.dumps(told))
+    agent = {"sees": "text", "prompts": {"dialect": "text"}, "sampling": {"max_tokens": 3}}
+    (made / "agent.yaml").write_text(yaml.safe_dump(agent))
+    return made
+
+
+@pytest.fixture(scope="session")
+def suite() -> Suite:
+    """Two tasks in bathrooms, where there is little to tell; no test task plays there."""
+    whole = load_suite("mini")
+    tasks = [task for task in whole.tasks if task.scene in ("FloorPlan410", "FloorPlan411")]
+    assert not {task.scene for task in tasks} & {*EVALUATION_SCENES}
+    return Suite("two", tuple(tasks[:2]), "digest", whole.env)
