@@ -48,7 +48,8 @@ def action_in(reply: str) -> str:
 def png(picture: NDArray[np.uint8]) -> bytes:
     """A picture, (height, width, 3) uint8, as a PNG file."""
     file = io.BytesIO()
-    Image.fromarray(picture).save(file, "PNG")
+    # Pillow's own level takes 57 ms for 800×450, four times as long as to draw, for a fifth less.
+    Image.fromarray(picture).save(file, "PNG", compress_level=1)
     return file.getvalue()
 
 
