@@ -37,7 +37,7 @@ PARAMETERS = {
 """Every action, with the parameters of all ways to call it."""
 NAMES = [
     # A filter removes the metadata that the checks need.
-    *(name for name in PARAMETERS if name != "SetObjectFilter"),
+    *(name for name in PARAMETERS if name not in ("SetObjectFilter", "SetObjectFilterForType")),
     # Without these parameters most actions would be refused.
     *3 * ("PickupObject", "OpenObject", "TeleportFull", "GetInteractablePoses"),
 ]
