@@ -328,7 +328,8 @@ class LocalClient:
             return None
         if self._kept is not None:
             self._kept.keep(row.prompt.name, row.turns())
-        return self._reply(row.prompt, row.said, row.scores)
+        reply = self._reply(row.prompt, row.said)
+        return Spoken(reply, row.prompt.ids, row.said, row.scores)
 
     # -- elsewhere, in whole batches ---------------------------------------------------------------
 
@@ -339,7 +340,10 @@ class LocalClient:
             self.forget()
             raise _explained(error, rows) from None
         self._go_on()
-        return [self._reply(row, said) for row, said in zip(rows, generated, strict=True)]
+        return [
+            Spoken(self._reply(row, said), row.ids, said)
+            for row, said in zip(rows, generated, strict=True)
+        ]
 
     def _go_on(self) -> None:
         """Raise CannotGoOn if it must not."""
@@ -419,15 +423,13 @@ class LocalClient:
         ends = (place for place, each in enumerate(said, start=1) if each in self._end_tokens)
         return said[: next(ends, None)]
 
-    def _reply(
-        self, row: EncodedPrompt, said: Sequence[int], scores: Sequence[float] = ()
-    ) -> Spoken:
+    def _reply(self, row: EncodedPrompt, said: Sequence[int]) -> Reply:
         with self._tokenizer_lock:
             text = self._tokenizer.decode(
                 said, skip_special_tokens=True, clean_up_tokenization_spaces=False
             )
         thought, text = _without_thought(text, row.thinking)
-        reply = Reply(
+        return Reply(
             text=text,
             reasoning=thought,
             usage=Usage(
@@ -439,7 +441,6 @@ class LocalClient:
             finish="stop" if said[-1] in self._end_tokens else "length",
             model=self._name,
         )
-        return Spoken(reply, row.ids, said, scores)
 
     def _ids(self, text: str) -> list[int]:
         with self._tokenizer_lock:

@@ -33,11 +33,11 @@ def one_thread() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """It says three letters."""
+    """It says a letter at a time."""
     made = make_tiny_qwen(tmp_path_factory.mktemp("reinforce") / "model", family="qwen2")
     told = json.loads((made / "generation_config.json").read_text()) | {"repetition_penalty": 1.0}
     (made / "generation_config.json").write_text(json.dumps(told))
-    agent = {"sees": "text", "prompts": {"dialect": "text"}, "sampling": {"max_tokens": 3}}
+    agent = {"sees": "text", "prompts": {"dialect": "text"}, "sampling": {"max_tokens": 1}}
     (made / "agent.yaml").write_text(yaml.safe_dump(agent))
     return made
 
