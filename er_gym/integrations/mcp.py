@@ -22,8 +22,7 @@ from mcp.server.mcpserver.utilities.types import Image
 from mcp_types import CallToolResult, TextContent
 
 from er_gym.integrations.session import Session, Turn, png
-from er_gym.tasks import verbs
-from er_gym.tasks.verbs import Verb
+from er_gym.integrations.verb_tools import VerbTool, verb_tools
 from er_gym.version import __version__
 
 MAX_EPISODES = 64
@@ -137,12 +136,11 @@ def make_server(episodes: Episodes | None = None, **settings: Any) -> MCPServer[
 
     server.add_tool(begin, structured_output=False)
     server.add_tool(act, structured_output=False)
-    for verb in verbs.table():
+    for tool in verb_tools():
         server.add_tool(
-            _alone(plays, verb) if verb.alone else _with_object(plays, verb),
-            name=verb.name.replace(" ", "_"),
-            description=f"Do the action '{verb.name}' in an episode: "
-            f"{verb.in_plan.format_map(_WORDS)}.",
+            _with_object(plays, tool) if tool.takes_object else _alone(plays, tool),
+            name=tool.name,
+            description=tool.about,
             structured_output=False,
         )
     return server
@@ -153,27 +151,20 @@ INSTRUCTIONS = (
     "task by one action at a time, and call 'end' when it is done. Objects are named by their "
     "type, such as Fridge or CounterTop."
 )
-_WORDS = {
-    "it": "the object",
-    "the": "the object",
-    "held": "what is held",
-    "inside": "in or on the object",
-    "reason": "",
-}
 
 
-def _alone(plays: Episodes, verb: Verb) -> Callable[..., CallToolResult]:
+def _alone(plays: Episodes, tool: VerbTool) -> Callable[..., CallToolResult]:
     def act(episode: str) -> CallToolResult:
         with _told_as_errors():
-            return _result(plays.step(episode, verb.name))
+            return _result(plays.step(episode, tool.action()))
 
     return act
 
 
-def _with_object(plays: Episodes, verb: Verb) -> Callable[..., CallToolResult]:
+def _with_object(plays: Episodes, tool: VerbTool) -> Callable[..., CallToolResult]:
     def act(object: str, episode: str) -> CallToolResult:
         with _told_as_errors():
-            return _result(plays.step(episode, f"{verb.name} {object}"))
+            return _result(plays.step(episode, tool.action(object)))
 
     return act
 
