@@ -10,6 +10,7 @@ from er_gym.data.critic import check, review
 from er_gym.data.knowledge import Knowledge, LastAction
 from er_gym.data.trajectory import SeenObject, Subgoal, ThoughtRecord
 from er_gym.envs.actions import Action
+from er_gym.envs.feedback_words import OUT_OF_REACH
 
 LIMIT = 200
 
@@ -187,6 +188,18 @@ def test_false_claims_are_refused(case: tuple[str, str]) -> None:
 )
 def test_true_claims_stand(text: str) -> None:
     assert codes(text) == set()
+
+
+def test_an_answer_in_chinese_is_read_as_one_in_english() -> None:
+    told = OUT_OF_REACH.zh.format(action="pickup Kettle", places="Mug")
+    actions = [_acted("pickup", "Kettle", False, told)]
+    known = replace(KITCHEN, language="zh", actions=actions, last=actions[0])
+    for text, code in (
+        ("拿水壶的时候，系统说手里已经有东西了。", "history"),
+        ("拿水壶的时候，系统说够不着。", ""),
+    ):
+        found = {each.code for each in check(text, "reasoning", known, limit=LIMIT)}
+        assert found == ({code} if code else set())
 
 
 def test_what_is_said_of_earlier_thoughts_is_compared_with_them() -> None:

@@ -120,11 +120,13 @@ def test_the_critic_is_asked_about_every_thought(
     verdicts: Callable[..., dict[str, verify.Verdict]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def check(text: str, kind: str, knowledge: Any, *, limit: int) -> tuple[Refusal, ...]:
+    def review(text: str, kind: str, knowledge: Any, *, limit: int) -> critic.Review:
         assert knowledge.instruction
-        return (Refusal("unseen", f"no {knowledge.turn}"),) if kind == "verification" else ()
+        if kind != "verification":
+            return critic.Review((), true=2, unknown=1)
+        return critic.Review((Refusal("unseen", f"no {knowledge.turn}"),), false=1)
 
-    monkeypatch.setattr(critic, "check", check)
+    monkeypatch.setattr(critic, "review", review)
     found = verdicts(collection, pictures=False)
     every = {one.id: one for one in collection.trajectories()}
     assert all(one.problems for one in found.values())
@@ -132,11 +134,13 @@ def test_the_critic_is_asked_about_every_thought(
         assert verdict.thoughts == sum(len(turn.thoughts) for turn in every[name].turns)
         last = every[name].actions - 1
         assert verdict.problems == (f"turn {last}: verification: unseen: no {last}",)
+        assert verdict.sentences == 3 * verdict.thoughts - 2
+        assert verdict.unread == verdict.thoughts - 1
 
-    def none(*_: Any, **__: Any) -> tuple[Refusal, ...]:
+    def none(*_: Any, **__: Any) -> critic.Review:
         raise NotImplementedError
 
-    monkeypatch.setattr(critic, "check", none)
+    monkeypatch.setattr(critic, "review", none)
     assert all(not one.problems and not one.thoughts for one in verdicts(collection).values())
 
 

@@ -256,8 +256,11 @@ def judge_answers(thought: Thought) -> Iterator[Verdict]:
         )
 
 
+_ENDED = re.compile(r"[.。]")
+
+
 def _quoted(each: LastAction) -> str:
-    return each.feedback.split(".")[0].split(" There is")[0] or "none"
+    return _ENDED.split(each.feedback)[0].split(" There is")[0] or "none"
 
 
 def _meant(thought: Thought, span: Span, told: int) -> list[LastAction] | None:
@@ -280,11 +283,16 @@ def _answers(each: LastAction, said: str) -> bool:
     """Whether an action was answered so, or may have been."""
     if each.success or not each.feedback:
         return said == "done" if each.success else True
-    text = each.feedback
-    if "names no action" in text:
-        return said == "no action"
-    if "none is within reach" in text or "close enough" in text:
-        return said == "far"
-    if "hand is empty" in text:
-        return said in ("empty hand", "stuck")
+    for words, fitting in _ANSWERS:
+        if any(word in each.feedback for word in words):
+            return said in fitting
     return said not in ("done", "no action")
+
+
+_ANSWERS = (
+    (("names no action", "不是一个动作"), ("no action",)),
+    (("none is within reach", "close enough", "够得着、看得见", "足够近"), ("far",)),
+    (("hand is empty", "手里是空的"), ("empty hand", "stuck")),
+)
+"""Words of the engine's answers, in both languages (:mod:`er_gym.envs.feedback_words`), and the
+reasons that a thought may give for them."""
