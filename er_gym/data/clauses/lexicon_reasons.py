@@ -60,7 +60,7 @@ _FIRST = r"(?:(?:at|on|with) (?:the|my) (?:very )?first|at once|straight away|ri
 
 ENGLISH = ReasonWords(
     goes_to=_all(
-        rf"{_X},? (?:which |that )?(?:is|are|was|were) (?:supposed|meant|intended) to (?:go|be|be put|be placed|end up|land|lie) {_INTO}",
+        rf"{_X},? (?:which |that )?(?:is|are|was|were) (?:supposed|meant|intended) to (?:go|be put|be placed|end up|land) {_INTO}",
         rf"{_X} (?:goes|has to (?:go|be put|be placed|end up)|have to (?:go|be put|end up)|needs? to (?:go|be put|be placed|end up)|must (?:go|be put|be placed|end up)|(?:is|are) wanted|(?:is|are) to (?:go|be put|be placed|end up)) {_INTO}",
         rf"\b(?:because|since|as)\b[^.]{{0,20}}{_X} belongs? {_INTO}",
         rf"\b(?:in order to|so as to|so that i can|so i can|because i (?:have to|need to|must|am to|'m to|want to)) (?:put|place|drop|store|leave|set|lay|stow) {_D}{_X} {_INTO}",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from er_gym.data.clauses.lexicon_reasons import REASONS
-from er_gym.data.clauses.reading import Span, Verdict, clauses_of, sentences_of
+from er_gym.data.clauses.reading import Span, Verdict, clauses_of, lexicon_of, sentences_of
 from er_gym.data.mentions import Mention, all_interchangeable, find_mentions, named_in
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
@@ -175,7 +175,7 @@ def judge_untouched(thought: Thought) -> Iterator[Verdict]:
 def judge_turned_down(thought: Thought) -> Iterator[Verdict]:
     """The next action is not done to some thing."""
     words, known = REASONS[thought.known.language], thought.known
-    target = known.decision.object_type
+    target, plain = known.decision.object_type, lexicon_of(thought).plain_verbs
     for clause, span in clauses_of(thought):
         if clause.asks or clause.conditional or not target:
             continue
@@ -186,6 +186,9 @@ def judge_turned_down(thought: Thought) -> Iterator[Verdict]:
                 continue
             for match in span.matches(phrases):
                 mention = span.named(match, "x")
+                acts = {name for name, each in plain.items() if each.search(match.group())}
+                if acts and known.decision.verb not in acts:
+                    continue  # who goes to a thing need not open it
                 if mention is not None and target in all_interchangeable(mention.types):
                     refusal = Refusal("decision", f"The next action is {known.decision}.")
                     yield Verdict(span.sentence, refusal)
