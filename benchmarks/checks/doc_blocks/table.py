@@ -49,6 +49,7 @@ NEVER: Mapping[str, tuple[str, ...]] = {
         "docs/agents.md: er-gym bench --suite er-1k --agent openai:",
         "docs/agents.md: er-gym bench --protocol paper",
         "docs/data.md: er-gym collect --suite train --limit 100 --out data/y",
+        "docs/data.md: er-gym data verify data/y",
         "docs/faults.md: er-gym bench --suite mini --agent openai:",
         "docs/serving.md: er-gym bench --suite er-1k --agent openai:",
         "docs/serving.md: er-gym bench --suite mini --limit 20 --agent openai:",
