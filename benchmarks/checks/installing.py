@@ -24,7 +24,7 @@ from benchmarks.cli.extras import extras
 from benchmarks.harness.output import ROOT
 from benchmarks.harness.tally import end
 
-_BY_THEMSELVES = ("ms-swift", "nemo-gym", "openenv", "rllib", "skyrl-gym", "verifiers", "verl")
+BY_THEMSELVES = ("ms-swift", "nemo-gym", "openenv", "rllib", "skyrl-gym", "verifiers", "verl")
 """The extras that do not go with constraints.txt; pyproject.toml says why."""
 _TRIED = "charts,ui,vlm"
 """The extras of the commands that are tried."""
@@ -74,7 +74,7 @@ def installed(environment: Path) -> Path:
 def resolve(python: Path, extra: str) -> str:
     """Pip's answer to a dry installation of the checkout with an extra ("": none)."""
     asked = [str(python), "-m", "pip", "install", "--dry-run"]
-    if extra not in _BY_THEMSELVES:
+    if extra not in BY_THEMSELVES:
         asked += ["--constraint", "constraints.txt"]
     done = subprocess.run(
         [*asked, f".[{extra}]" if extra else "."], cwd=ROOT, capture_output=True, text=True

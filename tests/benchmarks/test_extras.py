@@ -17,6 +17,7 @@ from packaging.utils import canonicalize_name
 from support import run_python
 
 from agents.zoo.index import find_model, model_names
+from benchmarks.checks.installing import BY_THEMSELVES
 from benchmarks.cli.extras import closure, installed_requires, installed_version, state_of
 
 if sys.version_info >= (3, 11):
@@ -84,7 +85,7 @@ def requires(name: str) -> list[str]:
     return installed_requires(name)
 
 
-@pytest.mark.parametrize("extra", EXTRAS)
+@pytest.mark.parametrize("extra", [name for name in EXTRAS if name not in BY_THEMSELVES])
 def test_an_extra_resolves_under_the_constraints(extra: str) -> None:
     """``python -m benchmarks.checks.installing`` has pip resolve them."""
     pinned = pins()

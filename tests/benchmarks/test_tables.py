@@ -241,7 +241,7 @@ def test_task_counts(monkeypatch: pytest.MonkeyPatch) -> None:
         make_task("single_toggle", scene="FloorPlan2"),
     ]
     task_counts.print_counts(tasks, {"rare": 1, "often": 3}, by_scene=True)
-    kinds, scenes, splits, dropped = found
+    kinds, scenes, splits, wordings, dropped = found
     counts = {row[1]: dict(zip(kinds.head, row, strict=True)) for row in kinds.rows}
     assert {name: (row["kitchen"], row["bedroom"], row["all"]) for name, row in counts.items()} == {
         "single_search": ("1", "2", "3"),
@@ -255,6 +255,7 @@ def test_task_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     by_type = dict(zip(scenes.head, scenes.rows[1], strict=True))
     assert (by_type["Exposed Object Search"], by_type["Exposed Object Toggle"]) == ("2", "0")
     assert sum(int(row[1]) for row in splits.rows) == 4
+    assert sum(int(row[1]) for row in wordings.rows) == 4
     assert dropped.rows == (("often", "3"), ("rare", "1"))
     found.clear()
     task_counts.print_counts(tasks, {})

@@ -165,4 +165,4 @@ def test_what_comes_with_er_gym_is_played_without_a_look_at_its_rooms(
     with pytest.raises(LookupError, match="unity"):
         fitted_tasks(suite, "unity")
     with pytest.raises(LookupError, match="embedded"):
-        fitted_tasks(replace(suite, tasks=(replace(suite.tasks[0], instruction="?"),)))
+        fitted_tasks(replace(suite, tasks=(replace(suite.tasks[0], name="?"),)))
