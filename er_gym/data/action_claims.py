@@ -149,10 +149,23 @@ def _hangs_on_another(thought: Thought, clause: Clause) -> bool:
     return any(each.sentence == clause.sentence and each.conditional for each in before)
 
 
+def _is_coming_job(thought: Thought, decided: Decided) -> bool:
+    """Whether "the mug must go into the sink first" tells the order of jobs: the hand is empty."""
+    needed = decided.weak or _NEEDED.search(decided.clause.text)
+    return decided.act == "put" and not thought.known.held and bool(needed)
+
+
+_NEEDED = re.compile(r"\b(?:must|need to|have to|has to|should)\b|得先|必须|应该|该先|要先")
+
+
 def check_decision(thought: Thought) -> Iterator[Refusal]:
     """Announces another action than the one that the turn takes."""
     known, phrases = thought.known, thought.phrases
-    those = [each for each in decided(thought) if each.act != "look around" or each.clause.last]
+    those = [
+        each
+        for each in decided(thought)
+        if (each.act != "look around" or each.clause.last) and not _is_coming_job(thought, each)
+    ]
     fitting = [each for each in those if _fits(thought, each)]
     others = [each for each in those if each not in fitting and not each.later]
     wrong = None

@@ -131,7 +131,10 @@ def _is_gapped(thought: Thought, clause: Clause, match: re.Match[str]) -> bool:
         return False
     if _ANY.search(clause.text[: first[0]]) and _ANY.search(clause.text[: last[0]]):
         return True
-    before = [each for each in thought.clauses if each.sentence == clause.sentence]
+    whole = [each for each in thought.clauses if each.sentence == clause.sentence]
+    if not any(_SAYS_SO.search(each.text) for each in whole):
+        return True
+    before = whole
     told = " ".join(each.text for each in before[: before.index(clause)])
     return bool(_ELSEWHERE.search(f"{told} {clause.text[: first[0]]}"))
 

@@ -9,7 +9,7 @@ from er_gym.data.mentions import find_mentions
 from er_gym.data.thought import Refusal, Thought
 from er_gym.thor import OBJECT_TYPES
 
-_FEWEST = 3
+_FEWEST = 2
 """Words."""
 _HAN = re.compile(r"[\u3400-\u4dbf\u4e00-\u9fff]")
 _OTHER_SCRIPTS = re.compile(r"[\u0370-\u1fff\u3040-\u30ff\uac00-\ud7af]")
@@ -43,7 +43,7 @@ def _lonely(text: str) -> int:
 
 
 def check_length(thought: Thought) -> Iterator[Refusal]:
-    """Empty, shorter than three words, or over the limit."""
+    """Empty, shorter than two words, or over the limit."""
     count = thought_length(thought.text)
     if not thought.text.strip():
         yield Refusal("length", "The thought is empty; write a sentence.")

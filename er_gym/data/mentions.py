@@ -65,6 +65,8 @@ WIDER: Mapping[str, tuple[str, ...]] = {
     "couch": ("ArmChair",),
     "spoon": ("Ladle",),
     "stool": ("Footstool", "Ottoman"),
+    "footstool": ("Ottoman",),
+    "脚凳": ("Ottoman",),
     "switch": ("StoveKnob",),
     "table": ("Desk", "TVStand"),
     "towel": ("HandTowel",),
@@ -123,7 +125,7 @@ _NO_NAME = re.compile(
 """What looks like a name and is none."""
 _NO_NAME_ZH = re.compile(
     r"地(?!板|面|上)|[花](?=时间|费|了|点|些|掉)|画(?=面|出|像)|布(?=局|置|满)|卡(?=住|在|着)|[分点]钟|时钟(?=方向)"
-    r"|书(?=房|写)|盘(?=算|点)|厕所|鞋(?=柜)|电话(?=里)|天花|蛋糕|床(?=头)(?!头柜|头桌)|切换|开关(?=门)|球(?=形)"
+    r"|书(?=房|写)|盘(?=算|点)|厕所|鞋(?=柜)|电话(?=里)|天花|蛋糕|床(?=头)(?!头柜|头桌)|切换|开关(?=门|过|了|一遍|一次)|球(?=形)"
     r"|[纸](?=上谈)|布满|刀(?=口)|灯(?=光|火)|池子|杯(?=具)|操作(?=台灯)"
 )
 _WORDS = re.compile(r"[A-Za-z]+(?:\d+)?")

@@ -121,7 +121,7 @@ PHRASES = Phrases(
         r"\b(?:usually|often|typically|normally|commonly|generally|tend(?:s)? to|people|someone who"
         r"|such as|things like|like an?|a place for|places? where|spots? for|spot where|kind of|sort of place"
         r"|natural|in general|in most|most (?:homes|kitchens|bathrooms|bedrooms|households)|kitchens"
-        r"|households|homes|common(?:ly)?|frequently|sometimes|regularly|as a rule|ordinarily|one would"
+        r"|households|homes|frowned upon|common(?:ly)?|frequently|sometimes|regularly|as a rule|ordinarily|one would"
         r"|makes sense|logical|reasonable|makes? (?:a|it) good|is where (?:people|one|you)|are (?:usually )?(?:kept|stored))\b"
     ),
     past=re.compile(

@@ -70,6 +70,7 @@ class Lexicon:
         near, far: phrases of distance.
         metres: a distance in metres, ``n``.
         compared: a distance that is only compared.
+        of_any: before ``y``: it is none in particular.
         contents: says what ``y`` contains.
         shut: says that ``y`` is closed.
     """
@@ -126,5 +127,6 @@ class Lexicon:
     far: Words
     metres: Words
     compared: Words
+    of_any: Words
     contents: Sequence[Words]
     shut: Words

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
 
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, is_told, lexicon_of, sentences_of
 from er_gym.data.mentions import Mention, all_interchangeable, named_in
@@ -61,15 +62,21 @@ def _miscount(mention: Mention, number: int, most: int, least: int) -> Refusal |
     return None
 
 
+def _in_view(thought: Thought, clause: Clause, types: AbstractSet[str]) -> list[SeenObject]:
+    """The things of some types in the view ahead, on the sides that a clause tells."""
+    sides = {side for side, phrase in thought.phrases.sides.items() if phrase.search(clause.text)}
+    those = [each for each in thought.known.view if each.type in types]
+    return [each for each in those if not sides or each.side in sides]
+
+
 def _counted(
     thought: Thought, clause: Clause, span: Span, mention: Mention
 ) -> Sequence[SeenObject]:
     """The things of that name in the view ahead, on the side and the place that are told."""
-    wanted = all_interchangeable(mention.types)
-    those = [each for each in thought.known.view if each.type in wanted]
-    sides = {side for side, phrase in thought.phrases.sides.items() if phrase.search(clause.text)}
-    if sides:
-        those = [each for each in those if each.side in sides]
+    those = _in_view(thought, clause, all_interchangeable(mention.types))
+    alone = [one for each in sorted(mention.types) if (one := _in_view(thought, clause, {each}))]
+    if len(mention.types) > 1 and len(alone) > 1:
+        return min(alone, key=len)
     others = all_interchangeable(
         each for other in span.mentions if other is not mention for each in other.types
     )
@@ -156,6 +163,8 @@ def judge_rooms(thought: Thought) -> Iterator[Verdict]:
             for match in phrase.finditer(span.text):
                 around = span.text[max(0, match.start() - _ROUND) : match.end() + _ROUND]
                 if lexicon.room_in_general.search(around) or match.group() in instruction:
+                    continue
+                if span.clauses[0].asks:
                     continue
                 kinds = " or ".join(sorted(possible))
                 yield Verdict(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from er_gym.data.clauses.lexicon_reasons import REASONS
@@ -189,9 +190,17 @@ def judge_turned_down(thought: Thought) -> Iterator[Verdict]:
                 acts = {name for name, each in plain.items() if each.search(match.group())}
                 if acts and known.decision.verb not in acts:
                     continue  # who goes to a thing need not open it
+                if _is_aside(thought, clause, match):
+                    continue
                 if mention is not None and target in all_interchangeable(mention.types):
                     refusal = Refusal("decision", f"The next action is {known.decision}.")
                     yield Verdict(span.sentence, refusal)
+
+
+def _is_aside(thought: Thought, clause: Clause, match: re.Match[str]) -> bool:
+    """Whether "not bowls" stands in the midst of a sentence that tells of something else."""
+    whole = next(each for each in thought.clauses if each.sentence == clause.sentence)
+    return match.group().startswith("not ") and not whole.text.startswith(clause.text)
 
 
 def judge_own_words(thought: Thought) -> Iterator[Verdict]:

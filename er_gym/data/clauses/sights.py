@@ -233,6 +233,8 @@ def judge_contents(thought: Thought) -> Iterator[Verdict]:
                 continue
             if _is_known_inside(thought, span, match, holder):
                 continue
+            if lexicon.of_any.search(span.text[: match.start("y")]):
+                continue  # one of those that are open, or none in particular
             if any(is_given(thought, each) for each in span.mentions if each is not holder):
                 continue
             yield Verdict(
