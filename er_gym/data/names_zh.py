@@ -108,7 +108,7 @@ NAMES_ZH: Mapping[str, tuple[str, ...]] = {
     "RoomDecor": ("房间装饰", "房间摆设"),
     "Safe": ("保险箱", "保险柜"),
     "SaltShaker": ("盐瓶", "盐罐", "盐"),
-    "ScrubBrush": ("刷子", "马桶刷", "清洁刷", "硬毛刷"),
+    "ScrubBrush": ("刷子", "马桶刷", "洁厕刷", "厕刷", "清洁刷", "硬毛刷"),
     "Shelf": ("架子", "搁板", "层板", "搁架"),
     "ShelvingUnit": ("置物架", "货架", "储物架"),
     "ShowerCurtain": ("浴帘",),

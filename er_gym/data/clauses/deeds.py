@@ -92,6 +92,10 @@ def _deed(
     thought: Thought, sentence: int, verb: str, mention: Mention, denied: bool, match: re.Match[str]
 ) -> Iterator[Verdict]:
     verb = _as_opening(verb, mention)
+    if verb in (verbs.OPEN, verbs.CLOSE) and not any(
+        {"openable", "toggleable"} & OBJECT_TYPES[each].properties for each in mention.types
+    ):
+        return  # it was misread: nobody opens a bed
     if not denied:
         done = has_done(thought, verb, mention)
         yield Verdict(sentence, None if done else _not_done(thought, verb, mention))

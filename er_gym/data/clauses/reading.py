@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from er_gym.data.clauses.lexicon import Lexicon, Words
 from er_gym.data.clauses.lexicon_en import LEXICON as ENGLISH
@@ -93,9 +93,52 @@ def clauses_of(thought: Thought) -> Sequence[tuple[Clause, Span]]:
     if found is None:
         found = thought.kept["clauses"] = [
             (each, Span(each.text, each.mentions, each.places, each.sentence, (each,)))
-            for each in thought.parts
+            for each in (*thought.parts, *resolved(thought))
         ]
     return found
+
+
+_STANDS_FOR: Mapping[Language, Words] = {
+    "en": re.compile(
+        r"^(?P<start>(?:and|but|so|no|yes|now|well|,| )*)(?P<it>it|they)(?=\b)"
+        r"|(?P<none>\bnone)(?=$|[,.;!]| (?:anywhere|here|in sight|in view|around|that i can see))"
+        r"|\b(?P<one>(?:of |see |seen |noticed |spotted )(?:one|it))(?=$|[,.;!]| (?:anywhere|since))"
+    ),
+    "zh": re.compile(r"(?P<it>它(?!们|的|这|那|里|上))"),
+}
+"""A pronoun for a thing that was named before."""
+
+
+def resolved(thought: Thought) -> Iterator[Clause]:
+    """Clauses that name nothing but speak of the one thing that was named before, with its name."""
+    phrase = _STANDS_FOR[thought.known.language]
+    last: tuple[Mention, ...] = ()
+    named_in_sentence = -1
+    for each in thought.parts:
+        if each.mentions:
+            same = named_in_sentence == each.sentence
+            last = (*last, *each.mentions) if same else each.mentions
+            named_in_sentence = each.sentence
+            continue
+        match = phrase.search(each.text)
+        near = each.sentence - named_in_sentence <= 1
+        if match is None or len({one.types for one in last}) != 1 or not near:
+            continue
+        said = match.groupdict()
+        start, pronoun = match.start(), match.group()
+        if said.get("none"):
+            text = f"no {MARK}"
+        elif said.get("one"):
+            text = f"{pronoun.split()[0]} a {MARK}"
+        else:
+            text = f"{said.get('start') or ''}{MARK}"
+        body = each.text[:start] + text + each.text[match.end() :]
+        yield replace(
+            each,
+            text=body,
+            mentions=(last[-1],),
+            places=(body.index(MARK),),
+        )
 
 
 def sentences_of(thought: Thought) -> Sequence[Span]:
