@@ -274,6 +274,7 @@ PHRASES = Phrases(
         r"\bmakes? (?:the most |more |good |perfect )?sense to\b|\bmy (?:plan|decision|choice) is(?: now)? to\b|\bdecision is to\b|\bdecided(?: to|:)",
         r"\b(?:is|are) (?:what|where|the one) i(?:'ll| will|'m going to)(?= (?:open|go|take|head|close|pick|visit|try|check) )",
         r"\b(?:so|now|therefore|thus|hence|next|then|accordingly),? i(?= )",
+        r"\b(?:this (?:very )?(?:moment|minute|instant)|before anything else),? i(?:'ll)?(?= )",
         r"\bi'm(?= (?:now )?(?:off|on my way|headed) to\b)|^(?:and |so |now |but )*(?=off to )",
         r"\bi(?:'m| am)(?: now| just| simply| therefore)?(?= (?:going|heading|walking|moving|running|opening|pulling|closing|shutting|picking|grabbing|taking|fetching|putting|placing|dropping|setting|switching|turning)\b)",
         r"^i(?= (?:now |therefore |simply |then )?(?:go|head|walk|open|close|shut|pick|take|grab|place|switch|toggle|navigate|return|approach)\b)",

@@ -34,7 +34,9 @@ _STATE = (
 def _act(words: str, after: str = "") -> Phrase:
     """A verb before its object, or after it with 把."""
     after = after or words
-    return re.compile(rf"去?(?:(?:{words})(?:一下)?{_D}{_X}|把{_D}{_X2}(?:{after})(?!.{{0,2}}了))")
+    return re.compile(
+        rf"去?(?:(?:{words})(?:一下)?{_D}{_X}|把{_D}{_X2}(?:的)?(?:柜?门|盖子?)?(?:{after})(?!.{{0,2}}了))"
+    )
 
 
 PHRASES = Phrases(
@@ -77,8 +79,8 @@ PHRASES = Phrases(
     out_of=(re.compile(rf"从{_D}{_Y}(?:里面?|中|上面?|内)?(?:把|拿出|取出|拿走|取走|拿起|拿|取){_D}(?P<xs>{MARK})"),),
     placing=re.compile(rf"(?:把|将|拿着|带着|找|需要|任务|目标)[^，。§]{{0,8}}(?:{MARK}{_JOINT}{_D})*$"),
     sides={
-        "left": re.compile(rf"(?<!{MARK})(?<!{MARK}的)(?<!它的)(?:左手边|左边|左侧|左方|左前方|左面)"),
-        "right": re.compile(rf"(?<!{MARK})(?<!{MARK}的)(?<!它的)(?:右手边|右边|右侧|右方|右前方|右面)"),
+        "left": re.compile(rf"(?<!{MARK})(?<!{MARK}的)(?<!它的)(?:左手边|左边|左侧|左方|左前方|左面)|(?<=在)左(?=$|[，。；、])"),
+        "right": re.compile(rf"(?<!{MARK})(?<!{MARK}的)(?<!它的)(?:右手边|右边|右侧|右方|右前方|右面)|(?<=在)右(?=$|[，。；、])"),
         "behind": re.compile(rf"(?<!{MARK})(?<!{MARK}的)(?<!它的)(?:身后|背后|我的?后面|我的?后方)"),
         "ahead": re.compile(rf"(?<!{MARK})(?<!{MARK}的)(?<!它的)(?<!左)(?<!右)(?:正前方|正对面|前方|我的?前面)"),
     },

@@ -14,7 +14,7 @@ from er_gym.data.action_claims import has_done
 from er_gym.data.claims import is_placing, not_on
 from er_gym.data.clauses.lexicon import Words
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, lexicon_of, sentences_of
-from er_gym.data.mentions import Mention, all_interchangeable, named_in
+from er_gym.data.mentions import Mention, all_interchangeable, find_mentions, named_in
 from er_gym.data.phrases import MARK
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
@@ -34,7 +34,7 @@ _TURNS = _words(
     r"|could|might|should|must|will|can|let|want|try|tried|before|until|when|while|after|if|to (?:be|get"
     r"|take|hold)|need|needs|about to|going to|ready|empty|other|another|else|yet|used to|looking for"
     r"|once|free|back|put|place|drop|far from|out of)\b|n't\b|'ll\b|\?",
-    r"没|不|未|别|无|非|差点|几乎|本来|要(?!命)|会(?!儿)|能|该|想|让|等|如果|的话|之前|以前|时候|时|再|空|放|准备|打算|去|另|比|像|才|就行|吗|呢|只有|哪|什么",
+    r"没|不|未|别|无|非|差点|几乎|本来|要(?!命)|会(?!儿)|能|该|想|让|等|如果|的话|之前|以前|时候|时|再|空|准备|打算|去|另|比|像|(?<![刚方])才|就行|吗|呢|只有|哪|什么",
 )
 """Words that may turn the sense of a clause."""
 _HAND = _words(
@@ -50,7 +50,7 @@ _HAND = _words(
 _TAKEN = _words(
     r"\b(?:picked|took|taken|grabbed|got|gotten|fetched|collected|retrieved|snatched|scooped|seized"
     r"|lifted|plucked|pocketed|secured|bagged|nabbed)\b|\bup (?:it|they) (?:went|came)\b|\bcame (?:up|away)\b",
-    r"(?:拿|取|捡|抓|拾|拎|端|捞|掏|抽|摸|揣|夹)(?:[^，。；§]{0,2})?(?:了|过|到|起|走|出|下来|上来)|到手|入手|拿下",
+    r"(?:拿|取|捡|抓|拾|拎|端|捞|掏|抽|摸|揣|夹)(?:[^，。；§]{0,4})?(?:了|过|到|起|走|出|下来|上来)|到手|入手|拿下|一[拿抓取捡够]就",
 )
 _SELF = _words(
     r"\b(?:i|i've|i'd|my|me)\b",
@@ -58,7 +58,7 @@ _SELF = _words(
 )
 _EASE = _words(
     r"\bwithout (?:any |a |the slightest |much )?(?:trouble|problem|hitch|fuss|effort|difficulty|resistance"
-    r"|ado|struggle|snag)\b|\b(?:first|one) (?:try|attempt|go|grab|time|shot)\b|\beas(?:y|ily)\b"
+    r"|ado|struggle|snag)\b|\b(?:first|one) (?:try|attempt|go|grab|shot)\b|\beas(?:y|ily)\b"
     r"|\beffortless(?:ly)?\b|\bno (?:trouble|problem|fuss|effort)\b|\bup it went\b|\bsmoothly\b"
     r"|\bstraight away\b|\bright away\b|\bat once\b|\bin one go\b|\ba breeze\b|\bsuccessfully\b"
     r"|\b(?:went|came) (?:fine|well|up nicely|up at once)\b|\bwillingly\b",
@@ -68,7 +68,7 @@ _LIES = _words(
     r"\b(?:fallen|fell|rolled|slid|found (?:its|their) way|made it|made their way|ended up|landed|come to rest"
     r"|(?:is|are)(?: [a-z]+){0,3}|it's(?: [a-z]+){0,2}|§'s(?: [a-z]+){0,2}|lies|lie|sits|sit|stands|stand|rests|rest|spread|spreads"
     r"|perched|balanced|tucked|placed|lying|sitting|standing|resting|waits|hangs|leans|nestles|dangles|perches"
-    r"|lounges|sprawls|stays|lives|basks|soaks|floats|drapes)(?: [a-z]+(?<!out)(?<!of)(?<!off)){0,2} (?:on|in|into|onto|inside|to|upon|atop|on top of)"
+    r"|lounges|sprawls|stays|lives|basks|soaks|floats|drapes)(?: [a-z]+(?<!of)(?<!off)){0,2} (?:on|in|into|onto|inside|to|upon|atop|on top of)"
     r" (?:the (?:edge|rim|top|side|corner|surface|bottom|middle) of )?(?:(?:the|that|this|my|its|a) )?(?:[a-z]+ ){0,2}$",
     r"^(?:[\u4e00-\u9fff]{0,8})(?:[放摆躺搁挂立铺架靠插堆叠晾搭待留落丢塞滚掉浸泡晒睡坐压贴码斜]|就|正|还|也|则|都|是|明明)(?:着)?[在到进](?:了)?(?:那|这|那边|这边|旁边|左边|右边)?(?:[一张个只块台的]{0,3})$",
 )
@@ -92,7 +92,10 @@ def judge_hand_loosely(thought: Thought) -> Iterator[Verdict]:
         if not hand or len(span.mentions) != 1 or clause.past or not _plain(thought, clause):
             continue
         mention = span.mentions[0]
-        if not _portable(mention) or mention.types & thought.held:
+        if "放" in clause.text:
+            continue
+        named = hand.end() == span.places[0] and language == "zh"
+        if not (named or _portable(mention)) or mention.types & thought.held:
             continue
         refusal = Refusal("held", f"{name_of(mention)} is not in the hand: {truth}.")
         yield Verdict(span.sentence, refusal)
@@ -101,7 +104,8 @@ def judge_hand_loosely(thought: Thought) -> Iterator[Verdict]:
 def judge_ease(thought: Thought) -> Iterator[Verdict]:
     """A thing was taken easily, although the first attempt failed or none was made."""
     language = thought.known.language
-    for span in sentences_of(thought):
+    spans = [*sentences_of(thought), *(span for _, span in clauses_of(thought))]
+    for span in spans:
         if any(each.guessed or each.wanted for each in span.clauses):
             continue
         ease, taken = _EASE[language].search(span.text), _TAKEN[language].search(span.text)
@@ -126,7 +130,7 @@ def judge_taken(thought: Thought) -> Iterator[Verdict]:
         if not taken or not _SELF[language].search(clause.text) or not _plain(thought, clause):
             continue
         portable = [each for each in span.mentions if _portable(each)]
-        if len(portable) != 1 or len(span.mentions) > 2 or clause.past and language == "en":
+        if len(portable) != 1 or len(span.mentions) > 3 or (clause.past and language == "en"):
             continue
         if language == "en" and not re.match(
             rf".*?\bi(?:'ve| have)? (?:[a-z]+ly |just |already |also )*{taken.group()}(?: up| hold of| out| away)?"
@@ -155,7 +159,7 @@ def judge_lies_loosely(thought: Thought) -> Iterator[Verdict]:
                 continue
             if not _ON_IT[language].search(span.text[end + 1 :]):
                 continue
-            if k and _joins(span, k) or is_placing(clause, begin - 1, thought.phrases):
+            if (k and _joins(span, k)) or is_placing(clause, begin - 1, thought.phrases):
                 continue
             if thought.phrases.of_other.search(span.text[: begin - 1]):
                 continue
@@ -167,7 +171,12 @@ def judge_lies_loosely(thought: Thought) -> Iterator[Verdict]:
 
 def _joins(span: Span, k: int) -> bool:
     """Whether a name is but a further one, such as "the mug on the desk is in the sink"."""
-    return bool(re.search(r"\b(?:on|in|by|near|from|of|at|beside)\b|[在从]", span.text[span.places[k - 1] + 1 : span.places[k]]))
+    return bool(
+        re.search(
+            r"\b(?:on|in|by|near|from|of|at|beside)\b|[在从]",
+            span.text[span.places[k - 1] + 1 : span.places[k]],
+        )
+    )
 
 
 _SENT = _words(
@@ -183,14 +192,29 @@ def judge_wanted(thought: Thought) -> Iterator[Verdict]:
     asked = all_interchangeable((*named_in(known.instruction), *_own(thought)))
     for span in sentences_of(thought):
         match = _SENT[known.language].search(span.text)
-        if not match or lexicon_of(thought).undone.search(span.text):
+        if not match or lexicon_of(thought).undone.search(span.text[: match.end() + 25]):
             continue
         if any(each.conditional or each.hedged for each in span.clauses):
             continue
         mention = span.first(match.end(), match.end() + 25)
-        if mention is not None and not mention.types & asked:
+        first = _first_named(known.instruction)
+        ordered = first and mention is not None and _FIRST.search(match.group())
+        late = ordered and _portable(mention) and not mention.types & first
+        if mention is not None and (late or not mention.types & asked):
             detail = f"The task says: “{known.instruction}”; do not say otherwise."
             yield Verdict(span.sentence, Refusal("task", detail))
+
+
+_FIRST = re.compile(r"\bfirst\b|第一|首先")
+_REORDERS = re.compile(r"\b(?:before|after)\b|之前|以前|之后|以后", re.IGNORECASE)
+
+
+def _first_named(instruction: str) -> frozenset[str]:
+    """What an instruction names first, unless it may tell its jobs in another order."""
+    named = find_mentions(instruction)
+    if not named or _REORDERS.search(instruction):
+        return frozenset()
+    return all_interchangeable(named[0].types)
 
 
 _QUOTED = re.compile(r"[\"“「『‘']([^\"”」』’]{4,120})[\"”」』’']")

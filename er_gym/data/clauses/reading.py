@@ -101,10 +101,12 @@ def clauses_of(thought: Thought) -> Sequence[tuple[Clause, Span]]:
 _STANDS_FOR: Mapping[Language, Words] = {
     "en": re.compile(
         r"^(?P<start>(?:and|but|so|no|yes|now|well|,| )*)(?P<it>it|they)(?=\b)"
-        r"|(?P<none>\bnone)(?=$|[,.;!]| (?:anywhere|here|in sight|in view|around|that i can see))"
+        r"|(?<=see )(?P<none>none)(?=$|[,.;!]| (?:anywhere|here|in sight|in view|around|that i can see))"
         r"|\b(?P<one>(?:of |see |seen |noticed |spotted )(?:one|it))(?=$|[,.;!]| (?:anywhere|since))"
+        r"|\b(?P<only>(?:only|just|no more than|nothing but) (?:one|a single one))(?=$|[,.;!]| (?:around|here|in"
+        r"|to be seen))"
     ),
-    "zh": re.compile(r"(?P<it>它(?!们|的|这|那|里|上))"),
+    "zh": re.compile(r"(?P<it>它(?!们|的(?!影|踪)|这|那|里|上))"),
 }
 """A pronoun for a thing that was named before."""
 
@@ -115,18 +117,27 @@ def resolved(thought: Thought) -> Iterator[Clause]:
     last: tuple[Mention, ...] = ()
     named_in_sentence = -1
     for each in thought.parts:
+        match = phrase.search(each.text)
+        leading = match is not None and match.start() == 0 and match["it"]
+        if each.mentions and leading and len({one.types for one in last}) == 1:
+            assert match is not None
+            body = (match.groupdict().get("start") or "") + MARK + each.text[match.end() :]
+            places = tuple(at for at, letter in enumerate(body) if letter == MARK)
+            if each.sentence - named_in_sentence <= 1:
+                yield replace(each, text=body, mentions=(last[-1], *each.mentions), places=places)
         if each.mentions:
             same = named_in_sentence == each.sentence
             last = (*last, *each.mentions) if same else each.mentions
             named_in_sentence = each.sentence
             continue
-        match = phrase.search(each.text)
         near = each.sentence - named_in_sentence <= 1
         if match is None or len({one.types for one in last}) != 1 or not near:
             continue
         said = match.groupdict()
         start, pronoun = match.start(), match.group()
-        if said.get("none"):
+        if said.get("only"):
+            text = f"only one {MARK}"
+        elif said.get("none"):
             text = f"no {MARK}"
         elif said.get("one"):
             text = f"{pronoun.split()[0]} a {MARK}"

@@ -252,7 +252,7 @@ _TOUCHED = (verbs.OPEN, verbs.CLOSE, verbs.PUT)
 
 def _is_known_inside(thought: Thought, span: Span, match: re.Match[str], holder: Mention) -> bool:
     """Whether the agent may have looked into a container of that name."""
-    there = [each for _, each in thought.things(holder.types)]
+    there = [each for _, each in thought.things(holder.types & _KEEPS)]
     if any(each.open is not False for each in there) or (not there and "Box" in holder.types):
         return True
     if any(each.on in holder.types for view in thought.views.values() for each in view):
