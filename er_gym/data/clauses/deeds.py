@@ -169,8 +169,8 @@ _PAST = re.compile(
 _ROUTE = re.compile(r"\b(?:that was|how i|was how|my route|was the order|how it went)\b")
 """It tells of a course that was taken."""
 _SAYS_WHEN = re.compile(
-    r"\b(?:first|before|after|afterwards?|then|later|subsequently|by the time|started|began|start|outset)\b"
-    r"|[先后]|之前|以前|开始"
+    r"\b(?:first|before|after|afterwards?|then|later|subsequently|by the time)\b"
+    r"|\b(?:started|began|start|outset)\b|[先后]|之前|以前|开始"
 )
 _LONGEST = 400
 """Letters of a sentence of which the order of deeds is read; the time grows with their square."""

@@ -101,10 +101,12 @@ def clauses_of(thought: Thought) -> Sequence[tuple[Clause, Span]]:
 _STANDS_FOR: Mapping[Language, Words] = {
     "en": re.compile(
         r"^(?P<start>(?:and|but|so|no|yes|now|well|,| )*)(?P<it>it|they)(?=\b)"
-        r"|(?<=see )(?P<none>none)(?=$|[,.;!]| (?:anywhere|here|in sight|in view|around|that i can see))"
-        r"|\b(?P<one>(?:of |see |seen |noticed |spotted )(?:one|it))(?=$|[,.;!]| (?:anywhere|since))"
-        r"|\b(?P<only>(?:only|just|no more than|nothing but) (?:one|a single one))(?=$|[,.;!]| (?:around|here|in"
-        r"|to be seen))"
+        r"|(?<=see )(?P<none>none)(?=$|[,.;!]| (?:anywhere|here|in sight|in view"
+        r"|around|that i can see))"
+        r"|\b(?P<one>(?:of |see |seen |noticed |spotted )(?:one|it))"
+        r"(?=$|[,.;!]| (?:anywhere|since))"
+        r"|\b(?P<only>(?:only|just|no more than|nothing but) (?:one|a single one))"
+        r"(?=$|[,.;!]| (?:around|here|in|to be seen))"
     ),
     "zh": re.compile(r"(?P<it>它(?!们|的(?!影|踪)|这|那|里|上))"),
 }
