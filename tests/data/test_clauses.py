@@ -242,3 +242,45 @@ def test_sentences_without_a_claim_are_counted_as_unknown() -> None:
 def test_what_came_of_nothing_and_what_is_meant_now_is_no_claim(text: str) -> None:
     """没有结果 denies no thing, and without 了 nothing has been opened or visited."""
     assert codes(text) <= {"decision"}
+
+
+# -- words in any order ----------------------------------------------------------------------------
+
+
+@in_one_test(
+    "case",
+    [
+        ("What I have come away with is the apple.", "held"),
+        ("One hand is busy, since it holds the apple.", "held"),
+        ("手里举着苹果。", "held"),
+        ("The kettle I pocketed without any trouble.", "history"),
+        ("水壶一试就拿到手了。", "history"),
+        ("苹果我已经从台面上拿走了。", "history"),
+        ("The apple has found its way into the fridge.", "support"),
+        ("What the task wants first is the kettle.", "task"),
+        ('"You cannot close Cabinet: it is jammed." Fine, leave it.', "history"),
+        ("The fridge stands on the right. It is wide open.", "state"),
+        ("I started with the counter and moved on to the cabinet.", "history"),
+    ],
+)
+def test_a_false_claim_in_any_order_is_refused(case: tuple[str, str]) -> None:
+    text, code = case
+    assert code in codes(text), text
+
+
+@in_one_test(
+    "text",
+    [
+        "What I have come away with is the mug.",
+        "My hand must let go of the mug before it can hold the apple.",
+        "The kettle would have come without any trouble had it been nearer.",
+        "手里是马克杯。",
+        "The apple has found its way onto the counter.",
+        "What the task wants first is the mug.",
+        "The fridge stands on the right. It is closed.",
+        "I started with the cabinet and moved on to the counter.",
+        "Knives, not sinks, are what I would look for in a drawer.",
+    ],
+)
+def test_an_honest_one_in_any_order_stands(text: str) -> None:
+    assert not codes(text), (text, codes(text))

@@ -42,6 +42,8 @@ SELF = _words(
     r"\b(?:i|i've|i'd|my|me)\b",
     r"我|亲手|已经|刚才|刚刚|早就|方才",
 )
+OVER = re.compile(r"[了过]|亲手|已经|早就|刚才|出来的")
+"""Chinese: a deed is over."""
 EASE = _words(
     r"\bwithout (?:any |a |the slightest |much )?(?:trouble|problem|hitch|fuss|effort|difficulty|resistance"
     r"|ado|struggle|snag)\b|\b(?:first|one) (?:try|attempt|go|grab|shot)\b|\beas(?:y|ily)\b"

@@ -19,6 +19,7 @@ from er_gym.data.clauses.lexicon_loose import (
     HAND,
     LIES,
     ON_IT,
+    OVER,
     QUOTED,
     REFUSES,
     REORDERS,
@@ -90,6 +91,8 @@ def judge_taken(thought: Thought) -> Iterator[Verdict]:
         taken = TAKEN[language].search(clause.text)
         if not taken or not SELF[language].search(clause.text) or not _plain(thought, clause):
             continue
+        if language == "zh" and not OVER.search(clause.text):
+            continue  # "so I take the newspaper"
         portable = [each for each in span.mentions if _portable(each)]
         if len(portable) != 1 or len(span.mentions) > 3 or (clause.past and language == "en"):
             continue
