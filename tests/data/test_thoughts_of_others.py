@@ -13,7 +13,7 @@ LEAST_REFUSED = {"dev": 0.87, "held_out": 0.71, "dev_b": 0.54, "held_out_b": 0.3
 """The least share of lies that is refused: three points less than when it was measured. The rules
 were mended on all of these files but ``held_out_b``."""
 MOST_REFUSED = {"dev": 4, "held_out": 4, "dev_b": 4, "held_out_b": 9}
-"""The most honest thoughts, of 200, that are refused; two in a hundred where the rules were mended."""
+"""The most honest thoughts, of 200, that are refused; 2 % where the rules were mended."""
 
 
 @pytest.fixture(scope="module", params=[*LEAST_REFUSED])
