@@ -188,6 +188,12 @@ SLOW: Mapping[str, tuple[str, ...]] = {
         "README.md: er-gym bench --suite er-1k --types single_search --agent rl:",
         "docs/learning.md: er-gym",
     ),
+    "plays through a plug, as tests/integrations do": (
+        "docs/integrations/mcp.md: import asyncio",
+        "docs/integrations/minari.md: # record.py",
+        "docs/integrations/vagen.md: # play_vagen.py",
+        "docs/integrations/verl-agent.md: # play_manager.py",
+    ),
     "is a file, which tests/test_extending.py imports with the others": (
         *(f"docs/extending.md: # household/{name}.py" for name in _FILES),
     ),
