@@ -126,3 +126,8 @@ def test_an_agent_is_moved_by_global_axes_and_at_random(kitchen):
     assert kitchen.agent["rotation"]["y"] == 90.0
     places = kitchen.do("RandomlyMoveAgent", randomSeed=5)
     assert kitchen.agent["position"] in places
+
+
+def test_no_type_is_no_object(kitchen):
+    assert kitchen.do("ObjectTypeToObjectIds", objectType=None) == []
+    assert kitchen.do("NumberOfPositionsObjectsOfTypeAreVisibleFrom", objectType=None) == {}

@@ -27,7 +27,7 @@ _FLOOR = [0, 2]
 @action("ObjectTypeToObjectIds")
 def object_type_to_object_ids(world: World, *, objectType: str) -> list[str]:
     """The ids of all objects of a type; case and spaces do not matter."""
-    wanted = objectType.replace(" ", "").lower()
+    wanted = (objectType or "").replace(" ", "").lower()
     kinds = {kind for kind in world.types if kind.lower() == wanted}
     return [world.object_ids[i] for i in world.of_type(*sorted(kinds))]
 

@@ -140,7 +140,7 @@ def number_of_positions_of_type(
     world: World, *, objectType: str, positions: list[Vector] | None = None
 ) -> dict[str, int]:
     """NumberOfPositionsFromWhichItemIsVisible of each object of a type; case does not matter."""
-    kinds = {kind for kind in world.types if kind.lower() == objectType.lower()}
+    kinds = {kind for kind in world.types if kind.lower() == (objectType or "").lower()}
     return {
         world.object_ids[i]: number_of_positions_visible(
             world, objectId=world.object_ids[i], positions=positions
