@@ -22,7 +22,8 @@ from er_gym.envs.faults import FaultPlan, FaultyActionHandler
 from er_gym.envs.feedback import failed
 from er_gym.envs.info import REPEATED, Details, Info, LegalActions
 from er_gym.envs.legality import KnownTypes
-from er_gym.envs.observations import MAX_REPEATS, Memory, Observation, Situation, text_of
+from er_gym.envs.memory import MAX_REPEATS, Memory
+from er_gym.envs.observations import Observation, Situation, text_of
 from er_gym.envs.perception import Perception
 from er_gym.envs.protocol import EpisodeProtocol
 from er_gym.tasks import verbs

@@ -62,7 +62,7 @@ class Episodes:
         session = Session(**self._settings)
         try:
             turn = session.reset(task_id or None, seed=seed, scene=scene or None)
-        except Exception:
+        except Exception:  # whatever it is goes on to the client; the simulator must not stay
             session.close()
             raise
         name = secrets.token_urlsafe(9)

@@ -16,8 +16,8 @@ from er_gym.envs import skills
 from er_gym.envs.actions import ACTIONS
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.legality import KnownTypes, available_objects, legal_actions, navigable_within
+from er_gym.envs.memory import Memory
 from er_gym.envs.object_view import object_features
-from er_gym.envs.observations import Memory
 from er_gym.envs.perception import Perception, perceive, type_names
 from er_gym.envs.perception import perception_of as perception_of_seen
 from er_gym.sim.lazy_metadata import LazyMetadata

@@ -1,6 +1,6 @@
 """The memories of many agents, and their observation ``state``, at once.
 
-:class:`~er_gym.envs.observations.Memory` and ``state`` of one agent are the rule; here are the same
+:class:`~er_gym.envs.memory.Memory` and ``state`` of one agent are the rule; here are the same
 operations on arrays with a row for each agent.
 """
 
@@ -12,15 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.envs.asked_goal import GOAL_VERBS, goal
+from er_gym.envs.memory import REMEMBERED, Memory
 from er_gym.envs.observations import (
     ASKED_ENTRIES,
     FEATURE_ROW,
     FEATURES,
     FIRST_DID,
     LAST_ENTRY,
-    REMEMBERED,
     SCALARS,
-    Memory,
     Situation,
     pose_and_episode,
 )
