@@ -71,8 +71,8 @@ def test_an_example_of_what_one_does_first_has_under_60_lines(repository: Path) 
 def test_the_own_agent_does_most_tasks(
     run_example: Run, repository: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (done,) = re.findall(r"^(\d+) of 12 tasks done$", run_example("own_agent"), re.MULTILINE)
-    assert int(done) >= 9
+    # Two instructions name the thing by another word than its type; one thing is not found.
+    assert "9 of 12 tasks done" in run_example("own_agent")
     monkeypatch.syspath_prepend(str(repository))
     assert make_agent("examples.own_agent:Fetcher").obs_mode == "text"
 
