@@ -3,8 +3,9 @@
 ``generate`` of transformers pads all conversations of a batch to the longest, and works until the
 longest reply ends. On a CPU, where memory moves slowly, most of the time goes there. Here one step
 processes what is new of each conversation (a turn, or the last token of its reply) side by side in
-one row, and attention reads the keys and values of each conversation where they are kept. A
-conversation can begin and end at any step.
+one row, and attention reads the keys and values of each conversation where they are kept (with
+:mod:`agents.vlm.clients.compiled_attention`, those of all in one call). A conversation can begin
+and end at any step.
 """
 
 from __future__ import annotations
@@ -12,13 +13,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import torch
 import transformers
+from numpy.typing import NDArray
 from torch.nn import functional
 from transformers import AttentionInterface
 
+from agents.vlm.clients.compiled_attention import NextTokens, addresses, has_kernel
 from agents.vlm.clients.kv_cache import CachedTurns, grown, positions_of, whole_model
 from agents.vlm.clients.padded_batch import EncodedPrompt, new_pictures
 from agents.vlm.clients.seeded_sampling import SampledScores, with_noise
@@ -56,6 +61,7 @@ class PackedRow:
             self.source = torch.Generator().manual_seed(prompt.seed)
         self._most = len(prompt.ids) + sampling.max_tokens
         self._layers = list(prompt.kept.layers) if prompt.kept is not None else []
+        self._addresses: NDArray[np.intp] | None = None
         self._after_prompt = torch.empty(0)
 
     @property
@@ -86,10 +92,27 @@ class PackedRow:
         if end > self._layers[layer][0].shape[1]:
             old, room = self._layers[layer], max(self._most, end)
             self._layers[layer] = (grown(old[0], self.done, room), grown(old[1], self.done, room))
+            self._addresses = None
         kept_keys, kept_values = self._layers[layer]
         kept_keys[:, self.done : end] = keys
         kept_values[:, self.done : end] = values
         return kept_keys[:, :end], kept_values[:, :end]
+
+    def memory(self) -> tuple[int, NDArray[np.intp]]:
+        """The memory of the conversation's keys and values, with room for one more token at least:
+        for how many tokens it has room, and its addresses."""
+        room = self._layers[0][0].shape[1]
+        if room <= self.done:
+            room = max(self._most, self.done + 1)
+            self._layers = [
+                (grown(keys, self.done, room), grown(values, self.done, room))
+                for keys, values in self._layers
+            ]
+            room = self._layers[0][0].shape[1]
+            self._addresses = None
+        if self._addresses is None:
+            self._addresses = addresses(self._layers)
+        return room, self._addresses
 
     def positions(self, model: Any, image_token: int | None) -> torch.Tensor:
         """Of the new tokens: (1, tokens), for a model with pictures (4, tokens)."""
@@ -116,6 +139,7 @@ class PackedModel:
     def __init__(self, model: Any, image_token: int | None, sampling: Sampling) -> None:
         self._model, self._image_token = model, image_token
         self._sampled = SampledScores(sampling.temperature or 1.0, sampling.top_p)
+        self._compiled = model.dtype == torch.float32 and has_kernel()
         whole = whole_model(model)
         if image_token is None:
             whole.set_attn_implementation(_NAME)
@@ -130,7 +154,7 @@ class PackedModel:
     def step(self, rows: Sequence[PackedRow]) -> None:
         """Add a token to the reply of each row."""
         new = [row.new for row in rows]
-        with _attended(list(zip(rows, map(len, new), strict=True))):
+        with _attended(_Attended.of(rows, [len(tokens) for tokens in new], self._compiled)):
             scores = self._model(**self._inputs(rows, new)).logits[0].float()  # (rows, words)
         for row, tokens in zip(rows, new, strict=True):
             row.done += len(tokens)
@@ -179,18 +203,44 @@ def can_be_packed(model: Any) -> bool:
 
 # -- attention -------------------------------------------------------------------------------------
 
-_rows: ContextVar[Sequence[tuple[PackedRow, int]]] = ContextVar("rows")
+
+@dataclass(frozen=True)
+class _Attended:
+    """The conversations whose new tokens the model is given, one after another.
+
+    Attributes:
+        longer: those that torch does: each with the place of its first new token and their number.
+        next: those that are one token longer and that the kernel does; None if there are none.
+    """
+
+    longer: Sequence[tuple[PackedRow, int, int]]
+    next: NextTokens | None
+
+    @classmethod
+    def of(cls, rows: Sequence[PackedRow], counts: Sequence[int], kernel: bool) -> _Attended:
+        """Those with so many new tokens each; ``kernel`` says whether there is one."""
+        longer, chosen = [], []
+        start = 0
+        for row, count in zip(rows, counts, strict=True):
+            if kernel and row.said:
+                chosen.append((start, row.done, *row.memory()))
+            else:
+                longer.append((row, start, count))
+            start += count
+        return cls(longer, NextTokens(*zip(*chosen, strict=True)) if chosen else None)
+
+
+_now: ContextVar[_Attended] = ContextVar("now")
 
 
 @contextmanager
-def _attended(rows: Sequence[tuple[PackedRow, int]]) -> Iterator[None]:
-    """The conversations whose new tokens the model gets within the context, one after another, and
-    how many those are."""
-    token = _rows.set(rows)
+def _attended(these: _Attended) -> Iterator[None]:
+    """The conversations whose new tokens the model gets within the context."""
+    token = _now.set(these)
     try:
         yield
     finally:
-        _rows.reset(token)
+        _now.reset(token)
 
 
 def _attention(
@@ -217,8 +267,11 @@ def _attention(
     _, heads, tokens, size = query.shape
     groups = key.shape[1]
     found = query.new_empty(1, tokens, heads, size)
-    start = 0
-    for row, count in _rows.get():
+    now = _now.get()
+    if now.next is not None:
+        scale = size**-0.5 if scaling is None else scaling
+        now.next.attend(module.layer_idx, query, key, value, found, scale)
+    for row, start, count in now.longer:
         end = start + count
         keys, values = row.with_new(module.layer_idx, key[0, :, start:end], value[0, :, start:end])
         asked = query[:, :, start:end]
@@ -236,7 +289,6 @@ def _attention(
                 attn_mask=mask, is_causal=mask is None, scale=scaling, enable_gqa=groups < heads,
             )  # fmt: skip
             found[:, start:end] = one.transpose(1, 2)
-        start = end
     return found, None
 
 

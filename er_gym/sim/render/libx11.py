@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from er_gym.sim.shared_library import load, load_bytes
+from er_gym.shared_library import load, load_bytes
 
 _SONAME = "libX11.so.6"
 _RASTERISER = "libp3tinydisplay.so"

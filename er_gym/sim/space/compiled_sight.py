@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from er_gym.sim.shared_library import compiled
+from er_gym.shared_library import compiled
 from er_gym.sim.space.frustum import NEAR_PLANE, Lens
 
 _SOURCE = Path(__file__).with_name("sight.c")

@@ -110,9 +110,15 @@ def padded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("agents.vlm.clients.local.can_be_packed", lambda model: False)
 
 
+@pytest.fixture
+def torchs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Packed rows where no kernel can be compiled."""
+    monkeypatch.setattr("agents.vlm.clients.packed_rows.has_kernel", lambda: False)
+
+
 @pytest.mark.parametrize("temperature", [0.0, 1.0])
 @pytest.mark.parametrize("family", ["qwen2", "qwen2_vl", "qwen2_5_vl", "qwen3_vl"])
-@pytest.mark.parametrize("way", ["packed", "padded"])
+@pytest.mark.parametrize("way", ["packed", "torchs", "padded"])
 def test_replies_are_those_of_a_model_that_begins_anew_each_turn(
     models: dict[str, Path],
     family: str,
@@ -120,8 +126,8 @@ def test_replies_are_those_of_a_model_that_begins_anew_each_turn(
     way: str,
     request: pytest.FixtureRequest,
 ) -> None:
-    if way == "padded":
-        request.getfixturevalue("padded")
+    if way != "packed":
+        request.getfixturevalue(way)
     sampling = {"max_tokens": 12, "temperature": temperature, "top_p": 0.9}
     anew = client(models[family], sampling=sampling, local={"reuse": False, "batch": 3})
     goes_on = client(models[family], sampling=sampling, local={"batch": 3})

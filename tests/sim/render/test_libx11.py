@@ -15,7 +15,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="other systems n
 NAMES = ("XOpenDisplay", "XFree", "_XPrivate")
 DRAW = """
 import sys
-from er_gym.sim import shared_library
+from er_gym import shared_library
 from er_gym.sim.render import libx11
 libx11._SONAME = "libZ11.so.6"
 BEFORE

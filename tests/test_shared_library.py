@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from er_gym.sim import shared_library
-from er_gym.sim.shared_library import compiled, compiler
+from er_gym import shared_library
+from er_gym.shared_library import compiled, compiler
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="this machine has no C compiler")
 
@@ -76,5 +76,5 @@ def test_a_compiler_that_fails_is_done_without(
 def test_what_the_system_does_not_load_is_done_without(
     source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shared_library, "_compile", lambda path: b"not a library")
+    monkeypatch.setattr(shared_library, "_compile", lambda path, flags: b"not a library")
     assert compiled(source) is None

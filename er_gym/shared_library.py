@@ -9,21 +9,27 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from hashlib import blake2b
 from pathlib import Path
 
 from er_gym.writing import kept
 
-_FLAGS = ("-O2", "-ffp-contract=off", "-fPIC", "-shared")
+_EXACT = ("-O2", "-ffp-contract=off")
 """No instructions of this processor alone, and no fused ones: each result is that of NumPy."""
+_FAST = ("-O3", "-march=native", "-fopenmp-simd", "-fno-math-errno", "-fno-trapping-math")
+"""All instructions of this processor, and sums in any order: right but for rounding."""
 _SECONDS = 60.0
 """For which a compiler is waited for."""
 
 
 def load(path: str) -> ctypes.PyDLL | None:
-    """The library at a path or of a name, None if the system does not load it."""
+    """The library at a path or of a name, None if the system does not load it.
+
+    Calls of its functions keep the GIL.
+    """
     try:
-        # Local, because another library may bring its own of the same name. Calls keep the GIL.
+        # Local, because another library may bring its own of the same name.
         return ctypes.PyDLL(path, mode=ctypes.RTLD_LOCAL)
     except OSError:
         return None
@@ -56,8 +62,13 @@ def load_from_memory(content: bytes, name: str) -> ctypes.PyDLL | None:
         return load(f"/proc/self/fd/{handle}")
 
 
-def compiled(source: Path) -> ctypes.PyDLL | None:
+def compiled(source: Path, *, exact: bool = True) -> ctypes.PyDLL | None:
     """The library of a C source, which the machine's compiler makes once for the user's cache.
+
+    Args:
+        source: the source.
+        exact: whether each result must be that of NumPy to the bit; otherwise it is right but for
+            rounding, and quicker.
 
     Returns:
         None where there is no C compiler, on systems other than Linux, and if anything fails:
@@ -67,14 +78,26 @@ def compiled(source: Path) -> ctypes.PyDLL | None:
         return None
     text = source.read_bytes()
     digest = blake2b(digest_size=8)
-    for part in (text, " ".join(_FLAGS).encode(), platform.machine().encode()):
+    flags = _EXACT if exact else _FAST
+    machine = platform.machine() if exact else _processor()
+    for part in (text, " ".join(flags).encode(), machine.encode()):
         digest.update(part)
     name = f"{source.stem}.so"
     try:
-        content = kept("compiled", digest.hexdigest(), name, lambda: _compile(source))
+        content = kept("compiled", digest.hexdigest(), name, lambda: _compile(source, flags))
     except (OSError, subprocess.SubprocessError):
         return None
     return load_bytes(content, name)
+
+
+def _processor() -> str:
+    """What tells processors with different instructions apart: a home may be shared by machines."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8", "replace").splitlines()
+    except OSError:
+        return platform.machine()
+    told = (line for line in lines if line.startswith(("flags", "Features", "model name")))
+    return "\n".join(sorted(set(told)))
 
 
 def compiler() -> str | None:
@@ -82,14 +105,14 @@ def compiler() -> str | None:
     return shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 
 
-def _compile(source: Path) -> bytes:
+def _compile(source: Path, flags: Sequence[str]) -> bytes:
     program = compiler()
     if program is None:
         raise FileNotFoundError("no C compiler is on the PATH")
     with tempfile.TemporaryDirectory(prefix="er-gym-") as folder:
         made = Path(folder, "made.so")
         subprocess.run(
-            [program, *_FLAGS, "-o", str(made), str(source), "-lm"],
+            [program, *flags, "-fPIC", "-shared", "-pthread", "-o", str(made), str(source), "-lm"],
             check=True,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,

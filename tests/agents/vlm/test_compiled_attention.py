@@ -1,0 +1,73 @@
+"""The compiled kernel of attention finds what torch finds."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("torch", reason="needs the extra local")
+
+import torch
+from torch.nn import functional
+
+from agents.vlm.clients.compiled_attention import NextTokens, addresses, has_kernel
+
+pytestmark = pytest.mark.skipif(not has_kernel(), reason="this machine has no C compiler")
+
+BEFORE = [0, 1, 14, 15, 16, 17, 40, 99]
+"""Tokens of the conversations before the new one: around the 16 that are done at once."""
+
+
+def kept(generator: torch.Generator, groups: int, before: int, room: int, size: int):
+    """Two layers' keys and values."""
+    shape = (groups, before + room, size)
+    return [tuple(torch.randn(shape, generator=generator) for _ in range(2)) for _ in range(2)]
+
+
+@pytest.mark.parametrize("size", [20, 32, 64, 128])
+@pytest.mark.parametrize(("heads", "groups"), [(4, 4), (6, 2)])
+@pytest.mark.parametrize("threads", [1, 3])
+def test_each_conversation_attends_to_its_own_tokens(
+    size: int, heads: int, groups: int, threads: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(torch, "get_num_threads", lambda: threads)
+    generator = torch.Generator().manual_seed(size + heads)
+    rooms = [1 + number % 3 for number in range(len(BEFORE))]
+    memories = [
+        kept(generator, groups, before, room, size)
+        for before, room in zip(BEFORE, rooms, strict=True)
+    ]
+    places = [2 * number + 1 for number in range(len(BEFORE))]  # others' tokens lie between
+    tokens = 2 * len(BEFORE) + 1
+    query = torch.randn(1, heads, tokens, size, generator=generator)
+    key, value = (
+        torch.randn(1, tokens, groups, size, generator=generator).transpose(1, 2) for _ in range(2)
+    )
+    found = torch.full((1, tokens, heads, size), torch.nan)
+    whole = [before + room for before, room in zip(BEFORE, rooms, strict=True)]
+    ones = NextTokens(places, BEFORE, whole, [addresses(each) for each in memories])
+    before = [[part.clone() for part in memory[0]] for memory in memories]
+    ones.attend(1, query, key, value, found, size**-0.5)
+    for number, (place, old) in enumerate(zip(places, BEFORE, strict=True)):
+        keys, values = memories[number][1]
+        assert torch.equal(keys[:, old], key[0, :, place])
+        assert torch.equal(values[:, old], value[0, :, place])
+        wanted = functional.scaled_dot_product_attention(
+            query[:, :, [place]], keys[None, :, : old + 1], values[None, :, : old + 1],
+            enable_gqa=True,
+        )  # fmt: skip
+        torch.testing.assert_close(found[:, place], wanted[:, :, 0], rtol=1e-5, atol=1e-6)
+        for part, same in zip(memories[number][0], before[number], strict=True):
+            assert torch.equal(part, same)  # the other layer
+    assert torch.isnan(found[0, 0::2]).all()  # nothing else is written
+
+
+def test_scores_of_any_size_give_no_overflow() -> None:
+    generator = torch.Generator().manual_seed(0)
+    memory = kept(generator, 1, 40, 1, 32)
+    query = torch.randn(1, 1, 1, 32, generator=generator) * 1e4
+    key, value = torch.randn(2, 1, 1, 1, 32, generator=generator)
+    found = torch.empty(1, 1, 1, 32)
+    NextTokens([0], [40], [41], [addresses(memory)]).attend(0, query, key, value, found, 1.0)
+    keys, values = memory[0]
+    wanted = functional.scaled_dot_product_attention(query, keys[None], values[None], scale=1.0)
+    torch.testing.assert_close(found[:, 0], wanted[:, :, 0])
