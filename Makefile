@@ -2,6 +2,7 @@
 # make test     run the tests, several at a time; one process: make test ARGS=-n0
 # make lint     check style and types
 # make check    lint, then test
+# make docs     build the documentation site in build/docs; open build/docs/index.html
 # make cover    run the tests and say which lines they do not reach (half as slow again)
 # make test-inspect   run the tests of er-gym inspect, with the extra that they need
 # make clean    remove what these left behind, the virtual environment included; runs/ stays
@@ -23,7 +24,7 @@ INSTALL := $(PIP) install --quiet --no-compile --constraint constraints.txt
 SHOWN := $(PYTHON) -m benchmarks.checks.shown
 MARK := $(VENV)/.er-gym
 
-.PHONY: bench test test-inspect cover lint check clean help
+.PHONY: bench test docs test-inspect cover lint check clean help
 .DELETE_ON_ERROR:
 
 help:
@@ -36,6 +37,10 @@ bench: $(MARK)-core
 
 test: $(MARK)-dev
 	$(BIN)/python -m pytest $(ARGS)
+
+docs: $(MARK)-docs
+	$(BIN)/python -m sphinx -q -W --keep-going -b html docs build/docs
+	@echo build/docs/index.html
 
 cover: $(MARK)-dev
 	$(BIN)/python -m pytest --cov --cov-report=term-missing:skip-covered $(ARGS)
@@ -62,6 +67,11 @@ $(MARK)-core: pyproject.toml constraints.txt | $(BIN)/python
 $(MARK)-dev: pyproject.toml constraints.txt | $(BIN)/python
 	@$(SHOWN) 'Installing er-gym and what its tests need in $(VENV), once' $(VENV) \
 	  $(INSTALL) --editable '.[dev]'
+	@touch $(MARK)-core $@
+
+$(MARK)-docs: pyproject.toml constraints.txt | $(BIN)/python
+	@$(SHOWN) 'Installing er-gym and what its documentation needs in $(VENV), once' $(VENV) \
+	  $(INSTALL) --editable '.[docs,vlm,mcp]'
 	@touch $(MARK)-core $@
 
 $(BIN)/python:

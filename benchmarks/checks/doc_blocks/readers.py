@@ -85,11 +85,20 @@ def _folders(text: str, folder: Path) -> None:
             raise ValueError(f"there is no folder {line.split()[0]}")
 
 
+def _task_file(text: str, folder: Path) -> None:
+    from er_gym.tasks.suites import suite_from_file
+
+    file = folder / "tasks.jsonl"
+    file.write_text(text, encoding="utf-8")
+    suite_from_file(file)
+
+
 READERS: Mapping[str, Callable[[str, Path], None]] = {
     "README.md: er_gym/sim": _folders,
     "docs/agents.md: <Observation>": _reply,
     "docs/cluster.md: apiVersion": _cluster,
     "docs/extending.md: [project.entry-points": _entry_points,
+    'docs/recipes.md: {"format"': _task_file,
     "docs/reinforcement.md: rewards:": _rewards,
     "docs/serving.md: server:": _settings,
     "docs/tasks.md: - name:": _recipes,

@@ -41,6 +41,8 @@ NEVER: Mapping[str, tuple[str, ...]] = {
         "docs/player.md: er-gym player install",
         "docs/player.md: er-gym player uninstall",
         "docs/serving.md: python -m venv",
+        "docs/start.md: python3 -m venv",
+        "docs/start.md: pip install",
         "docs/serving.md: llm/bin/pip",
         "docs/serving.md: cp llm/lib",
     ),

@@ -1,0 +1,35 @@
+"""The documentation site: it builds without a warning, which a link to nowhere would be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from er_gym.tasks.types import TASK_TYPES
+
+pytest.importorskip("sphinx", reason="needs the extra docs")
+
+from sphinx.cmd.build import main as build
+
+
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning", "ignore::DeprecationWarning")
+def test_every_link_leads_somewhere_and_every_page_is_listed(
+    repository: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # The builder "dummy" reads all pages and resolves their links, and writes nothing.
+    ended = build(
+        ["-q", "-W", "--keep-going", "-b", "dummy", str(repository / "docs"), str(tmp_path)]
+    )
+    assert ended == 0, capsys.readouterr().err
+
+
+def test_each_environment_has_a_page_with_its_picture(repository: Path) -> None:
+    pages = repository / "docs" / "environments"
+    listed = (pages / "index.md").read_text("utf-8")
+    for row in TASK_TYPES:
+        assert f"({row.env_id}.md)" in listed
+        assert f"images/environments/{row.env_id}.jpg" in (pages / f"{row.env_id}.md").read_text(
+            "utf-8"
+        )
+    assert len(list(pages.glob("*.md"))) == len(TASK_TYPES) + 1
