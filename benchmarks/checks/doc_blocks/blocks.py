@@ -92,7 +92,8 @@ def _blocks(page: str, text: str) -> Iterator[Block]:
             if fence:
                 opened, lines = (number, fence.group(1), fence.group(2)), []
         elif fence and fence.group(1).startswith(opened[1]) and not fence.group(2):
-            yield Block(page, opened[0], opened[2], "\n".join([*lines, ""]))
+            if not opened[2].startswith("{"):  # what the documentation site reads
+                yield Block(page, opened[0], opened[2], "\n".join([*lines, ""]))
             opened = None
         else:
             lines.append(line)
