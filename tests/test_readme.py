@@ -13,6 +13,7 @@ import pytest
 
 from benchmarks.checks.doc_blocks.blocks import SHELL, Part, blocks, pages
 from benchmarks.cli.main import cli
+from er_gym import __version__
 from er_gym.sim.actions import ACTIONS, perform
 from er_gym.sim.actions.refused import REFUSED
 from er_gym.sim.errors import WrongCall
@@ -107,3 +108,7 @@ def test_files_and_modules_exist(repository: Path) -> None:
             pkgutil.resolve_name(name)
         except (ImportError, AttributeError) as error:
             raise AssertionError(f"{page}: {name}") from error
+
+
+def test_the_citation_names_the_version(repository: Path) -> None:
+    assert f"\nversion: {__version__}\n" in (repository / "CITATION.cff").read_text("utf-8")

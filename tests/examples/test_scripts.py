@@ -186,3 +186,17 @@ def test_the_ai2thor_tutorial_runs_on_our_engine(
     assert done.returncode == 0, done.stderr
     assert "FloorPlan1_physics: 77 objects" in done.stdout
     assert "the apple is in ['Fridge|-02.10|+00.00|+01.07'], cold" in done.stdout
+
+
+def test_the_notebook_runs_from_top_to_bottom(
+    repository: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    notebook = json.loads((repository / "examples" / "first_steps.ipynb").read_text("utf-8"))
+    names: dict[str, object] = {}
+    for cell in notebook["cells"]:
+        if cell["cell_type"] == "code":
+            assert not cell["outputs"]  # they would be those of another version
+            exec("".join(cell["source"]), names)
+    said = capsys.readouterr().out
+    assert "success: True" in said
+    assert re.search(r"oracle +4 of 4", said)
