@@ -31,7 +31,7 @@ _SHAREGPT = (
 )
 _TASKS = "er-gym tasks convert mini tasks.json"
 GIVEN: Mapping[str, tuple[str, ...]] = {
-    "README.md": (_TASKS,),
+    "docs/commands.md": (_TASKS,),
     "docs/data-formats.md": (_COLLECTION, f"{_SHAREGPT} train.json"),
     "docs/data.md": (
         "er-gym bench --suite train --limit 12 --agent searcher --samples 2 --out runs/s1-samples",

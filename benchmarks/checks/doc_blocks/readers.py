@@ -94,7 +94,7 @@ def _task_file(text: str, folder: Path) -> None:
 
 
 READERS: Mapping[str, Callable[[str, Path], None]] = {
-    "README.md: er_gym/sim": _folders,
+    "CONTRIBUTING.md: er_gym/sim": _folders,
     "docs/agents.md: <Observation>": _reply,
     "docs/cluster.md: apiVersion": _cluster,
     "docs/extending.md: [project.entry-points": _entry_points,

@@ -17,7 +17,7 @@ _FILES = (
 NEVER: Mapping[str, tuple[str, ...]] = {
     "installs packages, or changes this Python's": (
         "README.md: make bench",
-        "README.md: pip uninstall",
+        "docs/install.md: pip uninstall",
         "README.md: er-gym player install",
         "README.md: er-gym player uninstall",
         "docs/agents.md: pip install",
@@ -48,12 +48,14 @@ NEVER: Mapping[str, tuple[str, ...]] = {
     ),
     "is what runs the tests, or lints": (
         "README.md: make test",
+        "CONTRIBUTING.md: make test",
         "CONTRIBUTING.md: make",
         "CONTRIBUTING.md: .ci/run",
         "CONTRIBUTING.md: .venv/bin/ruff",
     ),
     "asks a model on a server": (
         "README.md: er-gym bench --suite er-1k --agent openai:",
+        "docs/commands.md: er-gym bench --suite er-1k --agent openai:",
         "docs/agents.md: export OPENAI_API_KEY",
         "docs/agents.md: er-gym bench --suite mini --agent openai:",
         "docs/agents.md: er-gym bench --suite er-1k --agent openai:",
@@ -69,8 +71,7 @@ NEVER: Mapping[str, tuple[str, ...]] = {
     ),
     "needs a model that is not here": (
         "README.md: er-gym finetune",
-        "README.md: er-gym bench --suite er-1k --agent hf:",
-        "README.md: er-gym serve",
+        "docs/commands.md: er-gym serve",
         "docs/agents.md: er-gym bench --suite mini --agent hf:",
         "docs/agents.md: er-gym bench --suite er-1k --agent hf:",
         "docs/data.md: er-gym bench --suite train --agent hf:",
@@ -108,6 +109,7 @@ NEVER: Mapping[str, tuple[str, ...]] = {
         "docs/integrations/verl.md: # rows.py",
     ),
     "needs a GPU": ("docs/serving.md: CUDA_VISIBLE_DEVICES",),
+    "needs a container engine": ("docs/start.md: docker",),
     "needs a cluster": (
         "docs/cluster.md: er-gym",
         "docs/cluster.md: ray start",
@@ -116,6 +118,7 @@ NEVER: Mapping[str, tuple[str, ...]] = {
     ),
     "serves until it is ended": (
         "README.md: er-gym ui",
+        "docs/commands.md: er-gym ui",
         "docs/integrations/openenv.md: er-gym openenv --port",
         "docs/monitor.md: er-gym ui runs/ data/",
         "docs/monitor.md: er-gym ui --play",
@@ -141,7 +144,7 @@ NEVER: Mapping[str, tuple[str, ...]] = {
         "er_gym/tasks/data/train.md: er-gym tasks generate",
     ),
     "names something of the reader's own": (
-        "README.md: er-gym replay",
+        "docs/commands.md: er-gym replay",
         "docs/data.md: er-gym data show",
         "docs/ladder.md: er-gym new-model --from-gguf",
     ),
@@ -163,9 +166,13 @@ NEVER: Mapping[str, tuple[str, ...]] = {
 SLOW: Mapping[str, tuple[str, ...]] = {
     "starts worker processes": (
         "README.md: er-gym bench --suite mini",
-        "README.md: er-gym bench --tasks-file",
+        "docs/commands.md: er-gym bench --suite mini",
+        "docs/start.md: er-gym bench --suite mini",
+        "docs/commands.md: er-gym bench --tasks-file",
         "README.md: er-gym report",  # on those
-        "README.md: er-gym tasks generate",
+        "docs/commands.md: er-gym report",  # on those
+        "docs/start.md: er-gym report",  # on those
+        "docs/commands.md: er-gym tasks generate",
         "docs/extending.md: er-gym tasks generate",
         "docs/extending.md: er-gym bench",
         "docs/extending.md: ER_GYM_PLUGINS=verbs",
@@ -179,6 +186,7 @@ SLOW: Mapping[str, tuple[str, ...]] = {
     ),
     "takes more than a few seconds": (
         "README.md: er-gym doctor",
+        "docs/commands.md: er-gym doctor",
         "docs/player.md: er-gym doctor",
         "docs/monitor.md: er-gym ui --export",
         "docs/monitor.md: er-gym ui --video",
@@ -187,7 +195,8 @@ SLOW: Mapping[str, tuple[str, ...]] = {
     ),
     "trains for two minutes, or plays what was trained": (
         "README.md: er-gym train-rl",
-        "README.md: er-gym bench --suite er-1k --types single_search --agent rl:",
+        "docs/commands.md: er-gym train-rl",
+        "docs/commands.md: er-gym bench --suite er-1k --types single_search --agent rl:",
         "docs/learning.md: er-gym",
     ),
     "plays through a plug, as tests/integrations do": (
@@ -201,7 +210,8 @@ SLOW: Mapping[str, tuple[str, ...]] = {
     ),
     "makes a collection, or reads one": (
         "README.md: er-gym collect",
-        "README.md: er-gym data",
+        "docs/commands.md: er-gym collect",
+        "docs/commands.md: er-gym data",
         "docs/data.md: er-gym collect --suite train --limit 100 --out data/x",
         "docs/data.md: er-gym collect --select",
         "docs/data.md: er-gym collect --correct",
