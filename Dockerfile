@@ -1,8 +1,8 @@
 # er-gym in a container: no GPU, X server, Vulkan or Unity, and a user without rights.
 #
-#   docker build --tag er-gym .
-#   docker run --rm er-gym                                  # what works here
-#   docker run --rm --volume "$PWD/runs:/home/er/runs" er-gym bench --suite mini --agent oracle --out runs/x
+#   docker build --tag ergym .
+#   docker run --rm ergym                                  # what works here
+#   docker run --rm --volume "$PWD/runs:/home/er/runs" ergym bench --suite mini --agent oracle --out runs/x
 #
 # More extras: docker build --build-arg EXTRAS=vlm,ui .
 FROM python:3.11-slim

@@ -22,8 +22,9 @@ from er_gym.sim.settings import Settings
 from er_gym.sim.world import World
 
 
-def test_every_picture_and_page_is_there(repository: Path) -> None:
-    for link in re.findall(r"\]\(([^)#]+)\)", (repository / "README.md").read_text()):
+@pytest.mark.parametrize("page", ["README.md", "README.zh.md"])
+def test_every_picture_and_page_is_there(repository: Path, page: str) -> None:
+    for link in re.findall(r"\]\(([^)#]+)\)", (repository / page).read_text("utf-8")):
         if "://" not in link:
             assert (repository / link).exists(), link
 
@@ -112,3 +113,15 @@ def test_files_and_modules_exist(repository: Path) -> None:
 
 def test_the_citation_names_the_version(repository: Path) -> None:
     assert f"\nversion: {__version__}\n" in (repository / "CITATION.cff").read_text("utf-8")
+
+
+def test_the_chinese_page_has_the_same_commands_links_and_figures(repository: Path) -> None:
+    here, there = ((repository / page).read_text("utf-8") for page in ("README.md", "README.zh.md"))
+    for pattern in (
+        r"^(?:er-gym|make) [a-z][^#\n]*[^#\s]",  # commands, without what is said of them
+        r"^(?:import|env|obs|done|while|    \w)[^#\n]*[^#\s]",  # the program
+        r"\]\((?!README)([^)]+)\)",
+        r"\d+\.\d(?: \([\d. to]+\))? \|",
+        r"`ER-[\w-]+`|`examples/[\w.]+`",
+    ):
+        assert re.findall(pattern, here, re.MULTILINE) == re.findall(pattern, there, re.MULTILINE)
