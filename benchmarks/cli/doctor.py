@@ -44,14 +44,14 @@ def doctor(ray: bool, ray_address: str | None, shared_dir: Path | None) -> int:
             raise BadInput("--ray-address and --shared-dir are for --ray")
         from benchmarks.cli.doctor_checks import run_checks
 
-        return _show(run_checks())
+        return show_checks(run_checks())
     from benchmarks.cli.doctor_ray import ray_checks
 
     with bad_input():
-        return _show(ray_checks(ray_address or "", shared_dir))
+        return show_checks(ray_checks(ray_address or "", shared_dir))
 
 
-def _show(checks: Iterable[Check]) -> int:
+def show_checks(checks: Iterable[Check]) -> int:
     """Print each check as soon as it is made."""
     works = True
     for check in checks:

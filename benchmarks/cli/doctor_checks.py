@@ -179,6 +179,39 @@ def version_of_client() -> str:
     return f"ai2thor {there}{known}, commit_id {COMMIT_ID[:7]}"
 
 
+def unity_checks() -> Iterator[Check]:
+    """What Unity's build needs, part by part."""
+    for platform in ("CloudRendering", "Linux64"):
+        release = Release(platform)
+        there = "er-gym's player" if release.is_ours else "Unity's build"
+        found = f"{there} in {release.path}" if release.path.exists() else f"none in {release.path}"
+        fix = "er-gym player uninstall" if release.is_ours else _DOWNLOADED
+        yield Check(f"build {platform}", release.is_unity, found, "" if release.is_unity else fix)
+    vulkan = find_library("vulkan")
+    yield Check(
+        "Vulkan library", vulkan is not None, vulkan or "none",
+        "" if vulkan else "sudo apt install libvulkan1",
+    )  # fmt: skip
+    drivers = [file for folder in _DRIVERS for file in sorted(Path(folder).glob("*.json"))]
+    yield Check(
+        "Vulkan drivers", bool(drivers), ", ".join(file.stem for file in drivers) or "none",
+        "" if drivers else "install a GPU's driver, or sudo apt install mesa-vulkan-drivers",
+    )  # fmt: skip
+    display = os.environ.get("DISPLAY", "")
+    yield Check(
+        "display", bool(display), display or "DISPLAY is not set",
+        "" if display else "only Linux64 needs one: xvfb-run -s '-screen 0 1280x1024x24' …",
+    )  # fmt: skip
+    free = shutil.disk_usage(Path.home()).free / 1e9
+    yield Check("disk", free > 3, f"{free:.0f} GB free", "" if free > 3 else "a build takes 2 GB")
+    yield from _unity()
+
+
+_DOWNLOADED = "the client downloads it at first use, 1 GB from the network"
+_DRIVERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d")
+"""Where Vulkan's loader looks for drivers."""
+
+
 def _unity() -> Iterator[Check]:
     """Whether AI2-THOR's own build is installed and can start."""
     cloud, desktop = Release("CloudRendering"), Release("Linux64")

@@ -42,6 +42,7 @@ from benchmarks.cli.study import ablate, ladder
 from benchmarks.cli.tasks import tasks
 from benchmarks.cli.train import train_rl
 from benchmarks.cli.ui import ui
+from benchmarks.cli.unity import unity
 from benchmarks.cli.zoo import zoo
 from benchmarks.terminal import echo, stdout, terminal, use_any_encoding
 
@@ -113,6 +114,7 @@ def cli(context: click.Context, version: bool) -> None:
 cli.add_command(bench)
 cli.add_command(collect)
 cli.add_command(player)
+cli.add_command(unity)
 cli.add_command(doctor)
 cli.add_command(render)
 cli.add_command(play)

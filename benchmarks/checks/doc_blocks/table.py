@@ -109,6 +109,10 @@ NEVER: Mapping[str, tuple[str, ...]] = {
         "docs/integrations/verl.md: # rows.py",
     ),
     "needs a GPU": ("docs/serving.md: CUDA_VISIBLE_DEVICES",),
+    "needs Unity's build": (
+        "docs/fidelity.md: er-gym unity collect",
+        "docs/fidelity.md: er-gym unity compare",
+    ),
     "needs a container engine": ("docs/start.md: docker",),
     "needs a cluster": (
         "docs/cluster.md: er-gym",
