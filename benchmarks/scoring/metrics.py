@@ -112,6 +112,10 @@ class Score:
             whose only other key action was done and that does not ask for ``end``.
         missing: the scoring key actions that were not done, as ``"verb Type"``.
         sample: which of the task's episodes it is, from 1.
+        tidy_success: whether it is a success without side effects; None for a success of which the
+            record does not tell them.
+        side_effects: how many objects were changed that the task did not ask for
+            (:mod:`er_gym.tasks.side_effects`); None if the record does not tell.
     """
 
     task_id: str
@@ -127,6 +131,8 @@ class Score:
     key_action_precision: float
     missing: tuple[str, ...]
     sample: int = 1
+    tidy_success: bool | None = None
+    side_effects: int | None = None
 
 
 METRICS = (
@@ -140,6 +146,9 @@ METRICS = (
     "key_action_precision",
 )
 """The fields of :class:`Score` that are averaged, in the order in which reports give them."""
+TIDY, SIDE_EFFECTS = "tidy_success", "side_effects"
+IF_TOLD = (TIDY, SIDE_EFFECTS)
+"""Further ones, which are averaged where every score has them: older records lack them."""
 
 
 def score_episode(episode: EpisodeRecord, scorer: Scorer) -> Score:
@@ -148,6 +157,8 @@ def score_episode(episode: EpisodeRecord, scorer: Scorer) -> Score:
     missing = Counter(counted.expected) - Counter(counted.scored)
     if counted.points > len(counted.scored):
         missing.pop(END, None)
+    effects = episode.side_effects
+    tidy = None if counted.success and effects is None else counted.success and not effects
     return Score(
         task_id=episode.task_id,
         task_type=episode.task_type,
@@ -162,6 +173,8 @@ def score_episode(episode: EpisodeRecord, scorer: Scorer) -> Score:
         key_action_precision=key_action_precision(episode, counted),
         missing=tuple(missing.elements()),
         sample=episode.sample,
+        tidy_success=tidy,
+        side_effects=None if effects is None else len(effects),
     )
 
 
@@ -176,13 +189,18 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Summary:
-    """The means over ``n`` episodes: one :class:`Estimate` for each of :data:`METRICS`."""
+    """The means over ``n`` episodes: one :class:`Estimate` for each of :data:`METRICS`, and of
+    :data:`IF_TOLD` where all episodes tell."""
 
     n: int
     metrics: dict[str, Estimate]
 
     def __getitem__(self, metric: str) -> Estimate:
         return self.metrics[metric]
+
+    def get(self, metric: str) -> Estimate | None:
+        """The estimate of a metric; None if an episode does not tell it."""
+        return self.metrics.get(metric)
 
 
 def wilson(successes: int, n: int) -> Estimate:
@@ -259,7 +277,8 @@ def _within(estimate: Estimate, most: float) -> Estimate:
 
 
 def summarise(scores: Sequence[Score]) -> Summary:
-    """Means over episodes with 95 % intervals: Wilson's for success, the normal one for the rest.
+    """Means over episodes with 95 % intervals: Wilson's for success and tidy success, the normal
+    one for the rest.
 
     No metric is below 0. An interval ends there, and at 1 unless an episode has more than 1.
 
@@ -278,6 +297,13 @@ def summarise(scores: Sequence[Score]) -> Summary:
         values = [getattr(each, metric) for each in scores]
         mean = _between(tasks, values) if several else normal(values)
         means[metric] = _within(mean, max(1.0, *values))
+    told = {name: [getattr(each, name) for each in scores] for name in IF_TOLD}
+    if None not in told[TIDY]:
+        means[TIDY] = success_rate(tasks, told[TIDY])
+    if None not in told[SIDE_EFFECTS]:
+        effects = told[SIDE_EFFECTS]
+        mean = _between(tasks, effects) if several else normal(effects)
+        means[SIDE_EFFECTS] = _within(mean, max(effects))
     return Summary(len(scores), {"success": rate, **means})
 
 

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.scoring.metrics import (
+    IF_TOLD,
     METRICS,
+    Estimate,
     Score,
     Summary,
     score_episode,
@@ -219,6 +221,11 @@ def _run(run: RunReport) -> dict[str, Any]:
                         "name": part,
                         "n": summary.n,
                         **{key: dataclasses.asdict(summary[key]) for key in METRICS},
+                        **{
+                            key: dataclasses.asdict(told)
+                            for key in IF_TOLD
+                            if (told := summary.get(key)) is not None
+                        },
                     }
                     for level, part, summary in slices(scores)
                 ],
@@ -233,7 +240,8 @@ def _run(run: RunReport) -> dict[str, Any]:
 
 def _score(score: Score) -> dict[str, Any]:
     told = dataclasses.asdict(score)
-    return told if score.sample > 1 else {key: told[key] for key in told if key != "sample"}
+    plain = {"sample": 1, **dict.fromkeys(IF_TOLD)}
+    return {key: each for key, each in told.items() if key not in plain or each != plain[key]}
 
 
 def _samples(scores: Sequence[Score]) -> dict[str, Any]:
@@ -244,14 +252,19 @@ def _samples(scores: Sequence[Score]) -> dict[str, Any]:
     return {"samples": found} if found else {}
 
 
+def _cells(estimate: Estimate | None) -> tuple[float | None, ...]:
+    return (None, None, None) if estimate is None else dataclasses.astuple(estimate)
+
+
 def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = False) -> str:
     """One line per run, scorer and slice (overall and groups; task types if asked for).
 
-    Rates are fractions; a missing interval is empty. A task that was set aside, or an object that
-    stands for one that a scene lacks, has a line without figures; so does a file that is not an
-    episode, and a cause that records name.
+    Rates are fractions; a missing interval is empty, and so is what older records do not tell. A
+    task that was set aside, or an object that stands for one that a scene lacks, has a line without
+    figures; so does a file that is not an episode, and a cause that records name.
     """
-    columns = [f"{metric}{end}" for metric in METRICS for end in ("", "_low", "_high")]
+    metrics = (*METRICS, *IF_TOLD)
+    columns = [f"{metric}{end}" for metric in metrics for end in ("", "_low", "_high")]
     rows: list[tuple[object, ...]] = []
     for run in runs:
         manifest = run.manifest
@@ -260,7 +273,7 @@ def as_csv(runs: Sequence[RunReport], scorer: str = BOTH, with_types: bool = Fal
             for level, part, summary in slices(scores):
                 if level == "type" and not with_types:
                     continue
-                estimates = (dataclasses.astuple(summary[metric]) for metric in METRICS)
+                estimates = (_cells(summary.get(name)) for name in metrics)
                 rows.append((*head, name, level, part, summary.n, *chain(*estimates)))
         for level, lines in (
             ("set aside", map(str, run.manifest.set_aside)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from textwrap import fill
@@ -12,12 +13,13 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from benchmarks.scoring.metrics import METRICS, Estimate, Score
+from benchmarks.scoring.metrics import METRICS, TIDY, Estimate, Score
 from benchmarks.scoring.report import BOTH, RunReport, by_group, sample_slices, slices
 from benchmarks.scoring.samples import most_samples
 from benchmarks.terminal import without_control_codes
 from er_gym.envs.protocol import DEFAULT
 from er_gym.tables import Table
+from er_gym.tasks.side_effects import KINDS
 from er_gym.tasks.types import BY_NAME, GROUPS
 
 NONE = "-"
@@ -36,7 +38,8 @@ def tables(
     with_types: bool = False,
     with_misses: bool = False,
 ) -> list[Table]:
-    """The tables of a report: one of all runs, and up to four runs one of each with all metrics.
+    """The tables of a report: one of all runs, one of their side effects if their records tell
+    them, and up to four runs one of each with all metrics.
 
     Args:
         runs: a line each, or one for each scorer where the scorers differ.
@@ -44,7 +47,7 @@ def tables(
         with_types: add a table per run of every metric for each group and task type.
         with_misses: add a table per run of the episodes without success, under ``corrected``.
     """
-    found = [_overview(runs, scorer)]
+    found = [_overview(runs, scorer), *_side_effects(runs)]
     found += [
         _samples(run, name, scores, with_types)
         for run in runs
@@ -67,18 +70,20 @@ def tables(
 
 
 def _overview(runs: Sequence[RunReport], scorer: str) -> Table:
-    """The columns of the paper's result table, in its order.
+    """The columns of the paper's result table, in its order, and tidy success if a run tells it.
 
     Suite, protocol and scorer are columns only where they differ, else part of the title. The title
     omits the default protocol.
     """
+    tidy = any(each.side_effects is not None for run in runs for each in run.episodes)
     head = (
         *("Agent", "Suite", "Protocol", "Scorer", "n", "Success", "95 %"),
+        *("Tidy success",) * tidy,
         *("Search efficiency", "Task completeness"),
         *GROUPS,
     )
     rows = [
-        _overview_row(run, name, scores)
+        _overview_row(run, name, scores, tidy)
         for run in runs
         for name, scores in run.shown(scorer).items()
     ]
@@ -102,7 +107,9 @@ def _overview(runs: Sequence[RunReport], scorer: str) -> Table:
     )
 
 
-def _overview_row(run: RunReport, scorer: str, scores: Sequence[Score]) -> tuple[str, ...]:
+def _overview_row(
+    run: RunReport, scorer: str, scores: Sequence[Score], tidy: bool
+) -> tuple[str, ...]:
     size = run.manifest.suite_size
     tasks = len({each.task_id for each in scores})
     n = str(size) if tasks == size else f"{tasks}/{size}"
@@ -110,13 +117,14 @@ def _overview_row(run: RunReport, scorer: str, scores: Sequence[Score]) -> tuple
         n = f"{len(scores)} of {n}"
     head = (run.manifest.agent, run.manifest.suite, run.manifest.protocol, scorer, n)
     if not scores:
-        return (*head, *[NONE] * (4 + len(GROUPS)))
+        return (*head, *[NONE] * (4 + tidy + len(GROUPS)))
     groups = by_group(scores)
     overall = slices(scores)[0][2]
     return (
         *head,
         percent(overall["success"].mean),
         interval(overall["success"]),
+        *(percent_if_told(overall.get(TIDY)),) * tidy,
         percent(overall["search_efficiency"].mean),
         percent(overall["completeness"].mean),
         *(percent(groups[name]["success"].mean) if name in groups else NONE for name in GROUPS),
@@ -126,7 +134,8 @@ def _overview_row(run: RunReport, scorer: str, scores: Sequence[Score]) -> tuple
 def _metrics(run: RunReport, scorer: str, scores: Sequence[Score]) -> Table:
     """Every metric with its interval, and success by group."""
     whole = slices(scores)[0][2]
-    lines = [(name.replace("_", " ").capitalize(), whole.n, whole[name]) for name in METRICS]
+    known = [name for name in (METRICS[0], TIDY, *METRICS[1:]) if whole.get(name)]
+    lines = [(name.replace("_", " ").capitalize(), whole.n, whole[name]) for name in known]
     lines += [
         (f"Success: {group}", summary.n, summary["success"])
         for group, summary in by_group(scores).items()
@@ -140,8 +149,36 @@ def _metrics(run: RunReport, scorer: str, scores: Sequence[Score]) -> Table:
             for name, n, estimate in lines
         ),
         text_columns=1,
-        notes=(f"95 %: Wilson's interval of success, 1.96 standard errors{between} of the others",),
+        notes=(
+            f"95 %: Wilson's interval of success{' and tidy success' * (TIDY in known)}, 1.96 "
+            f"standard errors{between} of the others",
+        ),
     )
+
+
+def _side_effects(runs: Sequence[RunReport]) -> list[Table]:
+    """What the agents changed that no task asked for; nothing if no record tells."""
+    rows = []
+    for run in runs:
+        told = [each.side_effects for each in run.episodes if each.side_effects is not None]
+        if not told:
+            continue
+        kinds = Counter(effect.partition(" ")[0] for effects in told for effect in effects)
+        means = (kinds.total(), *(kinds[kind] for kind in KINDS))
+        without = sum(not effects for effects in told) / len(told)
+        figures = (f"{number / len(told):.2f}" for number in means)
+        rows.append((run.manifest.agent, str(run.path), str(len(told)), percent(without), *figures))
+    if not rows:
+        return []
+    return [
+        Table(
+            title="Side effects: objects an episode that the task did not ask to change",
+            head=("Agent", "Run", "n", "None, in %", "All", *(kind.capitalize() for kind in KINDS)),
+            rows=tuple(rows),
+            text_columns=2,
+            may_turn=True,
+        )
+    ]
 
 
 def _samples(run: RunReport, scorer: str, scores: Sequence[Score], with_types: bool) -> Table:
@@ -201,12 +238,14 @@ def _notes(run: RunReport) -> list[str]:
 
 def _types(run: RunReport, scorer: str, scores: Sequence[Score]) -> Table:
     lines = [(_name_of(level, name), summary) for level, name, summary in slices(scores)]
+    tidy = lines[0][1].get(TIDY) is not None
     rows = [
         (
             name,
             str(summary.n),
             percent(summary["success"].mean),
             interval(summary["success"]),
+            *(percent_if_told(summary.get(TIDY)),) * tidy,
             *(percent(summary[metric].mean) for metric in METRICS[1:]),
         )
         for name, summary in lines
@@ -215,6 +254,7 @@ def _types(run: RunReport, scorer: str, scores: Sequence[Score]) -> Table:
         title=f"{run.path}, scorer {scorer}, in %",
         head=(
             *("", "n", "Success", "95 %"),
+            *("Tidy success",) * tidy,
             *(name.replace("_", " ").capitalize() for name in METRICS[1:]),
         ),
         rows=tuple(rows),
@@ -245,6 +285,11 @@ def _misses(run: RunReport) -> Table:
 def percent(rate: float, digits: int = 2) -> str:
     """A rate in %."""
     return f"{100 * rate:.{digits}f}"
+
+
+def percent_if_told(estimate: Estimate | None, digits: int = 2) -> str:
+    """The mean of a rate in %, ``-`` for None."""
+    return NONE if estimate is None else percent(estimate.mean, digits)
 
 
 def interval(estimate: Estimate) -> str:

@@ -30,7 +30,9 @@ from er_gym.tasks import verbs
 from er_gym.tasks.arrangement import set_up_scene
 from er_gym.tasks.goal import Condition, unmet_conditions
 from er_gym.tasks.judge import Criteria, Progress
+from er_gym.tasks.side_effects import side_effects
 from er_gym.tasks.task import AgentPose, Task
+from er_gym.thor import ObjectTable
 from er_gym.thor.objects import ENTRY_KEYS
 
 MAX_UNKNOWN = 3
@@ -128,6 +130,8 @@ class Episode:
         self._replies_left = replies
         self._unknown_replies = 0
         self._goal_unmet: tuple[Condition, ...] = ()
+        self._room_before: ObjectTable | None = None  # None in an episode that was taken up
+        self._side_effects: tuple[str, ...] | None = None  # None until somebody has asked
 
     def begin(self) -> ResetResult:
         """Arrange the scene and place the agent."""
@@ -139,6 +143,7 @@ class Episode:
         self._make_handler(pose)
         placed = skills.place(controller, pose)
         self._perceive(placed)
+        self._room_before = self.perception.objects
         return self._told(None, "", placed.success, "", feedback_words.BEGUN(), placed.error, {})
 
     def _floor(self) -> skills.Reachable:
@@ -308,6 +313,26 @@ class Episode:
         )
         return reward
 
+    def _changed_unasked(self) -> tuple[str, ...]:
+        """The side effects of an episode that is over; worked out once."""
+        if self._side_effects is None:
+            if self._room_before is None:
+                self._room_before = self._room_arranged()
+            self._side_effects = side_effects(self.task, self._room_before, self.perception.objects)
+        return self._side_effects
+
+    def _room_arranged(self) -> ObjectTable:
+        """The room as the task arranges it; the controller's world is afterwards as it was."""
+        controller = self._controller
+        world, headless = controller.world_state(), controller.headless
+        controller.headless = True  # nothing of this is to be drawn
+        try:
+            set_up_scene(controller, self.task.scene, self.task.arrangement)
+            return skills.look(controller).objects
+        finally:
+            controller.restore_world(world)
+            controller.headless = headless
+
     def _objects_of_goal(self) -> Sequence[Mapping[str, Any]]:
         """Metadata of the objects that the goal is about.
 
@@ -450,6 +475,7 @@ class Episode:
             "keys_done": self._progress.done,
             "keys_left": self._progress.left,
             "unmet": self._goal_unmet,
+            "side_effects": self._changed_unasked() if self.end_reason else (),
             "visible": self.perception.visible_names,
             "navigable": self._known.names,
             "interactable": self._available.in_reach,

@@ -147,6 +147,9 @@ class Details(TypedDict):
     """The key actions not done yet, in the order of the task."""
     unmet: tuple[Condition, ...]
     """The conditions of the task's goal that did not hold at ``end``; empty before."""
+    side_effects: tuple[str, ...]
+    """After the last step: what the agent changed in the room that the task did not ask for, such
+    as ``"opened Fridge|-02.10|+00.00|+01.07"`` (:mod:`er_gym.tasks.side_effects`); empty before."""
     visible: tuple[str, ...]
     """The names of the types in ``visible_mask``, in alphabetical order."""
     navigable: tuple[str, ...]

@@ -109,6 +109,7 @@ def play_episode(
         error=error,
         cause=gave_up.cause if gave_up else "",
         gave_up=_encodable(" ".join(str(gave_up).split())) if gave_up else "",
+        side_effects=None if error or gave_up else _side_effects(info),
     )
 
 
@@ -122,6 +123,12 @@ def error_with_location(error: BaseException) -> str:
 def _encodable(text: str) -> str:
     """The text with lone surrogates escaped: models write them, but UTF-8 cannot hold them."""
     return text.encode("utf-8", "backslashreplace").decode()
+
+
+def _side_effects(info: Mapping[str, Any]) -> list[str] | None:
+    """Those that the environment tells; None for one that does not."""
+    told = info.get("side_effects")
+    return None if told is None else [*told]
 
 
 def _begun(task: Task, max_steps: int) -> EpisodeBegun:

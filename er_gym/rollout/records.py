@@ -168,9 +168,12 @@ class EpisodeRecord(GrownRecord):
         sample: which of the task's episodes it is, from 1.
         cause: of an episode that the agent could not finish, the name of the cause
             (:data:`er_gym.rollout.causes.CAUSES`), and ``gave_up`` what happened, in one line.
+        side_effects: what the agent changed that the task did not ask for
+            (:mod:`er_gym.tasks.side_effects`); None where that is not known: in a record that was
+            written before records had this field, and in an episode that was broken off.
     """
 
-    added = ("sample", "cause", "gave_up")
+    added = ("sample", "cause", "gave_up", "side_effects")
 
     format: Literal["er-gym/episode/1"] = "er-gym/episode/1"
     task_id: str
@@ -194,6 +197,7 @@ class EpisodeRecord(GrownRecord):
     sample: int = Field(default=1, ge=1)
     cause: str = ""
     gave_up: Words = ""
+    side_effects: list[str] | None = None
 
     @property
     def key(self) -> str:
@@ -225,6 +229,7 @@ def record_episode(
     error: str = "",
     cause: str = "",
     gave_up: str = "",
+    side_effects: list[str] | None = None,
 ) -> EpisodeRecord:
     """The record of an episode of a task.
 
@@ -261,4 +266,5 @@ def record_episode(
         error=error,
         cause=cause,
         gave_up=gave_up,
+        side_effects=side_effects,
     )

@@ -272,3 +272,34 @@ def test_a_narrow_terminal_turns_the_results(run):
 def test_the_command_offers_the_scorers_and_protocols_there_are():
     assert cli_options.SCORER_CHOICES == report.SCORER_CHOICES
     assert tuple(PROTOCOLS) == cli_options.PROTOCOL_CHOICES
+
+
+def test_tidy_success_stands_beside_success_where_records_tell(run_directory, episode):
+    for number, effects in enumerate([[], ["moved Apple|1", "opened Fridge|2"]], 1):
+        played = episode(KEYS, KEYS, task_id=f"task-{number}")
+        run_directory.write(played.model_copy(update={"side_effects": effects}))
+    loaded = load_run(run_directory.path)
+    overview, changed, every = tables([loaded], scorer="corrected")
+    assert overview.head[2:5] == ("Success", "95 %", "Tidy success")
+    assert overview.rows[0][2:5] == ("100.00", "34.2 to 100.0", "50.00")
+    assert changed.rows == (
+        ("oracle", str(loaded.path), "2", "50.00", "1.00", "0.50", "0.50", "0.00", "0.00", "0.00"),
+    )
+    assert ("Tidy success", "2", "50.00", "9.5 to 90.5") in every.rows
+    (told,) = json.loads(report.as_json([loaded]))["runs"]
+    scores = told["scorers"]["corrected"]
+    assert scores["slices"][0]["tidy_success"]["mean"] == 0.5
+    assert scores["slices"][0]["side_effects"]["mean"] == 1.0
+    assert [each["tidy_success"] for each in scores["episodes"]] == [True, False]
+    (row, *_) = csv.DictReader(io.StringIO(report.as_csv([loaded])))
+    assert (row["tidy_success"], row["side_effects"]) == ("0.5", "1.0")
+    # A success whose older record does not tell: no rate of tidy success can be given.
+    run_directory.write(episode(KEYS, KEYS, task_id="task-3"))
+    loaded = load_run(run_directory.path)
+    assert tables([loaded])[0].rows[0][4] == "-"
+    (row, *_) = csv.DictReader(io.StringIO(report.as_csv([loaded])))
+    assert row["tidy_success"] == ""
+    # A failure is no tidy success, whatever else it did.
+    run_directory.forget("task-3")
+    run_directory.write(episode(KEYS, (), task_id="task-4"))
+    assert tables([load_run(run_directory.path)])[0].rows[0][4] == "33.33"
