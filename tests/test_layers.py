@@ -56,7 +56,10 @@ _AGENTS = {*_DATA, *_OF_AGENTS}
 _SCORING = {*_DATA, "benchmarks.scoring", "benchmarks.terminal"}
 _STUDY = {*_AGENTS, *_SCORING, "benchmarks.study"}
 _MONITOR = {*_STUDY, "benchmarks.vlm_run", "benchmarks.monitor"}
-_COMMAND = {*_MONITOR, "benchmarks.unity", "er_gym.integrations", "benchmarks", "benchmarks.cli"}
+_COMMAND = {
+    *(*_MONITOR, "er_gym.integrations", "benchmarks.unity"),
+    *("benchmarks", "benchmarks.leaderboard", "benchmarks.cli"),
+}
 _HARNESS = {*_COMMAND, "benchmarks.harness"}
 _SCRIPTS = {*_HARNESS, "er_gym.sim", "benchmarks.perf", "benchmarks.checks", "benchmarks.pages"}
 ALLOWED = {
@@ -83,6 +86,7 @@ ALLOWED = {
     "benchmarks.terminal": {*_ENVS, "benchmarks.terminal"},
     "benchmarks.study": _STUDY,
     "benchmarks.unity": {*_ENVS, "benchmarks.unity"},
+    "benchmarks.leaderboard": {*_STUDY, "benchmarks.leaderboard"},
     "benchmarks.vision_probe": {*_COMMAND, "benchmarks.vision_probe"},
     "benchmarks.vlm_run": _AGENTS,
     "benchmarks.monitor": _MONITOR,

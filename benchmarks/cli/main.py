@@ -29,6 +29,7 @@ from benchmarks.cli.errors import (
 )
 from benchmarks.cli.finetune import finetune
 from benchmarks.cli.inspect import inspect
+from benchmarks.cli.leaderboard import leaderboard, submit
 from benchmarks.cli.new_model import new_model
 from benchmarks.cli.options import FOLDER, scorer_option
 from benchmarks.cli.player import player
@@ -133,6 +134,8 @@ cli.add_command(ablate)
 cli.add_command(ui)
 cli.add_command(new_model)
 cli.add_command(zoo)
+cli.add_command(submit)
+cli.add_command(leaderboard)
 cli.add_command(openenv)
 cli.add_command(mcp)
 

@@ -33,6 +33,8 @@ LONGEST_LINE = 4 << 20
 """The most bytes of a line of JSON Lines; the longest line of ``train`` has 4,600."""
 LARGEST_YAML = 1 << 16
 """The most characters of a YAML document; PyYAML takes up to two seconds for these."""
+LARGEST_STREAM = 1 << 30
+"""The most bytes, decompressed, of a file of JSON Lines of which one line at a time is kept."""
 MOST_VALUES = 2_000_000
 """The most commas and opening brackets in a JSON file; ``train`` has 0.6 million."""
 MOST_IN_YAML = 100_000
@@ -179,6 +181,42 @@ def read_json_lines(path: Path) -> Iterator[tuple[int, object]]:
         text = _decoded(line, path, number)
         if text.strip():
             yield number, parse_json(text, path, number)
+
+
+def stream_json_lines(path: Path, most: int = LARGEST_STREAM) -> Iterator[tuple[int, object]]:
+    """As :func:`read_json_lines`, for long files: one line at a time is in memory.
+
+    Args:
+        path: a regular file, decompressed if its name ends in ``.gz``.
+        most: the most bytes of all lines, decompressed.
+
+    Raises:
+        TaskFileError: as there, and each line may have as many values as a file there.
+    """
+    with open_file(path) as file:
+        packed = path.suffix.lower() == ".gz"
+        lines: Any = gzip.GzipFile(fileobj=file) if packed else file
+        number = total = 0
+        while True:
+            try:
+                line = lines.readline(LONGEST_LINE + 1)
+            except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+                raise TaskFileError(f"{path}: not a whole gzip file: {error}") from None
+            except OSError as error:
+                raise TaskFileError(f"{path}: {error.strerror}") from None
+            if not line:
+                return
+            number, total = number + 1, total + len(line)
+            if len(line) > LONGEST_LINE:
+                raise TaskFileError(f"{path}: line {number} is longer than {_size(LONGEST_LINE)}")
+            if total > most:
+                raise TaskFileError(
+                    f"{path}: larger than er-gym reads; such a file has at most {_size(most)}, "
+                    "unpacked"
+                )
+            text = _decoded(line, path, number)
+            if text.strip():
+                yield number, parse_json(text, path, number)
 
 
 def read_yaml(path: Path) -> Any:

@@ -182,6 +182,10 @@ SLOW: Mapping[str, tuple[str, ...]] = {
         "docs/extending.md: ER_GYM_PLUGINS=verbs",
         "docs/faults.md: er-gym bench --suite mini --agent searcher",
         "docs/faults.md: for rate",
+        "docs/leaderboard.md: er-gym bench",
+        "docs/leaderboard.md: er-gym submit",  # on that
+        "docs/leaderboard.md: er-gym leaderboard check",
+        "docs/leaderboard.md: er-gym leaderboard build",
         "docs/tasks.md: er-gym tasks verify er-1k",
         "docs/tasks.md: er-gym tasks generate",
         "docs/zoo.md: er-gym bench",
