@@ -1,1 +1,1 @@
-"""Agents without a model: the oracle, the random one, the searcher, and the mask reader."""
+"""Agents without a model: oracle, random, searcher and its kin, and those that cannot think."""

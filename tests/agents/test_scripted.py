@@ -13,6 +13,7 @@ from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.scorers import CORRECTED, PAPER
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.play import episode_seed, play_episode
+from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks.paper_format import read_tasks
 from er_gym.tasks.resolve import resolve_tasks
 from er_gym.tasks.suites import load_suite
@@ -95,3 +96,45 @@ def mask_info() -> dict[str, Any]:
 def test_an_unknown_agent_lists_those_there_are() -> None:
     with pytest.raises(ValueError, match="unknown agent 'genius'; choose one of: oracle, random"):
         make_agent("genius")
+
+
+@pytest.fixture(scope="module")
+def thoughtless() -> dict[str, list[EpisodeRecord]]:
+    """The episodes of the agents that cannot think, in a task of each group."""
+    tasks = load_suite("mini").tasks[::40]
+    names = ("do-nothing", "always-end", "repeat-last", "takes-all", "instruction-blind")
+    return {name: play_all(name, tasks) for name in names}
+
+
+def test_agents_that_cannot_think_do_what_they_are_named_for(
+    thoughtless: dict[str, list[EpisodeRecord]],
+) -> None:
+    verbs = {
+        name: {step.verb for record in records for step in record.steps[1:]}
+        for name, records in thoughtless.items()
+    }
+    assert verbs["do-nothing"] == {"observe"}
+    assert verbs["always-end"] == {"end"}
+    assert {"toggle", "pickup", "put in", "open", "navigate to", "end"} >= verbs["takes-all"]
+    assert {"pickup", "end"} <= verbs["takes-all"]
+    for record in thoughtless["repeat-last"]:
+        said = [step.text for step in record.steps[1:]]
+        assert said[0] == said[1] == said[2] != said[3:4]
+        assert record.end_reason != "repeated action"
+    for record in thoughtless["takes-all"]:
+        done = [step.text for step in record.steps[1:]]
+        assert len(done) == len({*done})
+        assert record.end_reason == "end"
+        assert len(record.side_effects or ()) > 1
+
+
+def test_a_blind_agent_reads_no_instruction() -> None:
+    task = load_suite("mini").tasks[0]
+    env = EmbodiedEnv([], obs_mode="text")
+    played = [
+        play_episode(env, make_agent("instruction-blind", 3), replace(task, instruction=text), 3)
+        for text in (task.instruction, "Say end.")
+    ]
+    env.close()
+    said, again = ([step.text for step in each.steps] for each in played)
+    assert said == again
