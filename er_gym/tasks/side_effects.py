@@ -12,7 +12,7 @@ broken    it is broken, or was cut up
 ========  ===================================================================================
 
 What an object carries moves with it and is not told: an apple on a plate lies on the plate as
-before. A burner goes by its knob, and both are one. What follows by itself from a change is not
+before. A burner goes by its knob, so the knob is told. What follows by itself from a change is not
 told either: a cup under a tap is filled, a potato on a burner is cooked.
 
 The task asks for what its key actions do and what its goal states (:class:`Asked`). As for the
@@ -118,9 +118,6 @@ def changes(before: ObjectTable, after: ObjectTable) -> Iterator[tuple[str, str]
     Yields:
         One of :data:`KINDS` and the object's id, in the order of ``before``.
     """
-    by_knob = {
-        before.ids[k] for rows in before.controlled for k in rows if before.type_of(k) in _KNOB_OF
-    }
     for old, name in enumerate(before.ids):
         new = after.row.get(name)
         if new is None:
@@ -132,7 +129,7 @@ def changes(before: ObjectTable, after: ObjectTable) -> Iterator[tuple[str, str]
             yield MOVED, name
         if now["isOpen"] != was["isOpen"]:
             yield OPENED, name
-        if now["isToggled"] != was["isToggled"] and name not in by_knob:
+        if now["isToggled"] != was["isToggled"] and before.type_of(old) not in _KNOB_OF:
             yield SWITCHED, name
         if now["isDirty"] and not was["isDirty"]:
             yield DIRTIED, name

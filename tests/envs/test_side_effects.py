@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from floor_plan_1 import APPLE, EGG, FRIDGE
 from support import Play, make_task
@@ -13,8 +14,9 @@ from er_gym.rollout.agent import Decision
 from er_gym.rollout.play import play_episode
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks.goal import Condition
-from er_gym.tasks.side_effects import Asked
+from er_gym.tasks.side_effects import Asked, changes
 from er_gym.tasks.task import Task
+from er_gym.thor.objects import KIND_OF, ObjectTable
 
 FIND = make_task("single_search", ("navigate to", FRIDGE), related_objects=(FRIDGE,))
 TAKE = make_task("single_pickup", ("pickup", APPLE))
@@ -61,6 +63,46 @@ def test_as_many_objects_as_the_task_handles_are_asked_for() -> None:
     assert asked.any_of == dict.fromkeys(
         [("switched", "StoveKnob"), ("dirtied", "StoveKnob"), ("broken", "StoveKnob")], 1
     )
+
+
+def table(*objects: tuple[str, str, str], held: str = "") -> ObjectTable:
+    """A room of objects: a type, what it lies in, and the state that it has."""
+    names = tuple(name for name, _, _ in objects)
+    row = {name: k for k, name in enumerate(names)}
+    return ObjectTable(
+        ids=names,
+        row=row,
+        kinds=np.array([KIND_OF[name] for name in names]),
+        has={
+            state: np.array([state == each for _, _, each in objects])
+            for state in ("isOpen", "isToggled", "isDirty", "isBroken", "isSliced")
+        },
+        centre=np.zeros((len(names), 3)),
+        size=np.zeros((len(names), 3)),
+        parents=[(row[holder],) if holder else () for _, holder, _ in objects],
+        contents=[()] * len(names),
+        controlled=[()] * len(names),
+        held=row.get(held, -1),
+    )
+
+
+def test_every_kind_of_change_is_told_once() -> None:
+    before = table(
+        ("Plate", "", "isDirty"), ("Apple", "Plate", ""), ("Fridge", "", "isOpen"), ("Mug", "", ""),
+        ("Bowl", "", ""), ("Vase", "", ""), ("Bread", "", ""), ("StoveBurner", "", ""),
+        ("StoveKnob", "", "isToggled"), ("Egg", "", ""),
+    )  # fmt: skip
+    after = table(
+        ("Plate", "Fridge", ""), ("Apple", "Plate", ""), ("Fridge", "", ""), ("Mug", "", ""),
+        ("Bowl", "", "isDirty"), ("Vase", "", "isBroken"), ("BreadSliced", "", ""),
+        ("StoveBurner", "", "isToggled"), ("StoveKnob", "", ""), ("Egg", "", ""),
+        held="Mug",
+    )  # fmt: skip
+    assert [*changes(before, before)] == []
+    assert [*changes(before, after)] == [
+        *(("moved", "Plate"), ("opened", "Fridge"), ("moved", "Mug"), ("dirtied", "Bowl")),
+        *(("broken", "Vase"), ("broken", "Bread"), ("switched", "StoveKnob")),
+    ]
 
 
 class _Untidy:
