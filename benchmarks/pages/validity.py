@@ -269,10 +269,12 @@ instruction, and goes through the lists of legal actions from A to Z.
 
 What `takes-all` gains is not chance. A task that asks to switch on the one lamp in a room is done
 by whoever switches everything, since success looks at what was asked for and at nothing else, as
-the paper's does. Its *tidy* success is what such an agent is worth, so compare agents by that,
-too. With `instances="target"` it also meets what was asked for more often, since there a type name
-means the task's own object first. The mask reader reads the instruction, so it is no measure of
-chance: it shows what the lists of legal actions give away to agents that get them as words.
+the paper's does. In a search it gathers things: when it ends, 11 to 12 types are within reach on
+average, and in 13 of its 24 successes it had carried the target there itself. Its *tidy* success is
+what such an agent is worth, so compare agents by that, too. With `instances="target"` it also meets
+what was asked for more often, since there a type name means the task's own object first. The mask
+reader reads the instruction, so it is no measure of chance: it shows what the lists of legal
+actions give away to agents that get them as words.
 """
 _REWARDS = """\
 *Reward not earned*: a step earned a reward although as many key actions were left after it as
@@ -282,9 +284,9 @@ environment said live. `python -m benchmarks.checks.one_judge` compares them in 
 suite.
 """
 _LEAKS = """\
-`er-1k` plays in rooms that no training task has. `er-val` and `mini` play in training rooms, for
+`er-1k` plays in rooms that no training task has. `er-val` and most of `mini` play in training rooms, for
 choices between models and for quick tries; nearly half of `mini` are tasks that `train` has, too,
-so a figure on `mini` says nothing about an agent that was trained. Short instructions of the same
+so a figure on `mini` says nothing of an agent that was trained. Short instructions of the same
 words are told in many rooms, so a match to the letter says little alone; with the room it would.
 The last row counts tasks of `train` in a wording that is kept for evaluation.
 """
