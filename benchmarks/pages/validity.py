@@ -284,11 +284,11 @@ environment said live. `python -m benchmarks.checks.one_judge` compares them in 
 suite.
 """
 _LEAKS = """\
-`er-1k` plays in rooms that no training task has. `er-val` and most of `mini` play in training rooms, for
-choices between models and for quick tries; nearly half of `mini` are tasks that `train` has, too,
-so a figure on `mini` says nothing of an agent that was trained. Short instructions of the same
-words are told in many rooms, so a match to the letter says little alone; with the room it would.
-The last row counts tasks of `train` in a wording that is kept for evaluation.
+`er-1k` plays in rooms that no training task has. `er-val` and most of `mini` play in training
+rooms, for choices between models and for quick tries; nearly half of `mini` are tasks that `train`
+has, too, so a figure on `mini` says nothing of an agent that was trained. Short instructions of the
+same words are told in many rooms, so a match to the letter says little alone; with the room it
+would. The last row counts tasks of `train` in a wording that is kept for evaluation.
 """
 
 if __name__ == "__main__":
