@@ -248,7 +248,9 @@ def test_bench_continues_and_report_reports(tasks_file, tmp_path, er_gym):
     code, shown, _ = er_gym("report", out, "--format", "csv")
     assert [row["name"] for row in csv.DictReader(io.StringIO(shown))] == ["all", "Manipulate"]
     code, shown, _ = er_gym("report", out, "--format", "md", "--misses", "--by-type")
-    assert "| oracle | 7 | 100.00 | 64.6 to 100.0 | 100.00 | 100.00 | - | 100.00 | - | - |" in shown
+    row = "| oracle | 7 | 100.00 | 64.6 to 100.0 | 100.00 | 100.00 | 100.00 | - | 100.00 | - | - |"
+    assert row in shown
+    assert f"| oracle | {out} | 7 | 100.00 | 0.00 | 0.00 | 0.00 | 0.00 | 0.00 | 0.00 |" in shown
     assert f"**{out}: 0 of 7 episodes without success**" in shown
     code, shown, err = er_gym("report", out, "--misses", "--scorer", "paper")
     assert (code, err) == (0, "")
