@@ -91,8 +91,14 @@ def row(checked: Checked, months: Mapping[str, str]) -> tuple[Cell, ...]:
         _number(tokens / solved if solved and tokens else None, "{:,.0f}"),
         _number(sum(each.num_steps - 1 for each in submission.episodes) / len(scores), "{:.1f}"),
         Cell(manifest.er_gym),
-        Cell(f"{checked.replayed} episodes" if checked.replayed else "no"),
+        Cell(_replayed(checked)),
     )
+
+
+def _replayed(checked: Checked) -> str:
+    if not checked.replayed:
+        return "no"
+    return f"{checked.replayed} episodes{', not the pictures' * bool(checked.notes)}"
 
 
 def _agent(submission: Submission) -> str:

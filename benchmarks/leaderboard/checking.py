@@ -142,10 +142,16 @@ def _by_pictures(
         )
         return
     for record, talk in shown:
-        settings, task = picture_settings(talk), tasks.get(record.task_id)
-        if settings is None or task is None:
-            notes.append(f"{record.key}: pictures of noise are not compared")
+        task = tasks.get(record.task_id)
+        if task is None:  # which is told as a problem of its own
             continue
-        env = environments["rgb+text"]
-        found = foreign_pictures(env, task, record, talk, settings)
+        try:
+            settings = picture_settings(talk)
+            if settings.noise:
+                notes.append(f"{record.key}: it was shown noise, which is not compared")
+                continue
+            env = environments["rgb+text"]
+            found = [*foreign_pictures(env, task, record, talk, settings)]
+        except (TypeError, ValueError) as error:
+            found = [f"it cannot be drawn: {error}"]
         yield from (Problem("picture", record.key, words) for words in found)

@@ -51,8 +51,13 @@ def by_records(submission: Submission) -> Iterator[Problem]:
     yield from _talks(submission)
     if Costs.of(submission.conversations.values()) != header.costs:
         yield Problem("cost", "", "the costs are not the sums over the conversations")
-    if submission.episodes and claims(submission) != header.results:
-        yield Problem("claim", "", "the results are not those of the records")
+    try:
+        agrees = claims(submission) == header.results
+    except (ValueError, LookupError) as error:  # a type of task that nobody has
+        yield Problem("claim", "", f"the records cannot be scored: {error}")
+    else:
+        if not agrees:
+            yield Problem("claim", "", "the results are not those of the records")
     values = known_secrets()
     for where, text in texts_of(submission):
         yield from (Problem("secret", "", f"{where} holds {w}") for w in secrets_in(text, values))
@@ -90,7 +95,7 @@ def _foreign(header: Header, record: EpisodeRecord) -> Iterator[str]:
 def _misjudged(record: EpisodeRecord) -> Iterator[str]:
     try:
         verdict, by_step = judged(record), judged_by_step(record)
-    except ValueError as error:
+    except (ValueError, LookupError) as error:
         yield f"it cannot be judged: {error}"
         return
     success = succeeded(verdict.success, record.error or record.gave_up)

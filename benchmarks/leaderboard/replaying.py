@@ -16,11 +16,14 @@ from er_gym.envs.info import detail
 from er_gym.rollout.agent import CannotFinish, Decision
 from er_gym.rollout.play import Playable, play_episode
 from er_gym.rollout.records import ERROR, EpisodeRecord, StepRecord
+from er_gym.tasks.errors import first_problem
 from er_gym.tasks.task import Task
 
 _STEP = tuple(name for name in StepRecord.model_fields if name not in ("thought", "text"))
 _END = ("max_steps", "success", "goal_unmet", "end_reason", "total_reward", "side_effects")
 _SHOWN = 160
+LARGEST = 1 << 24
+"""The most pixels of a picture that is made to compare it."""
 
 
 class Repeating:
@@ -100,13 +103,19 @@ def pictures_of(conversation: ConversationRecord) -> list[str]:
     return [part.digest for part in parts if isinstance(part, PictureRecord)]
 
 
-def picture_settings(conversation: ConversationRecord) -> Pictures | None:
-    """How pictures were encoded; None where that cannot be done again."""
+def picture_settings(conversation: ConversationRecord) -> Pictures:
+    """How pictures were encoded.
+
+    Raises:
+        ValueError: a stranger's settings are none, or ask for pictures that fill the memory.
+    """
     try:
         found = Pictures.model_validate(conversation.settings.get("pictures", {}))
-    except ValidationError:
-        return None
-    return None if found.noise else found
+    except ValidationError as error:
+        raise ValueError(f"the settings of pictures are none: {first_problem(error)}") from None
+    if found.min_pixels > LARGEST:
+        raise ValueError(f"pictures are to have {found.min_pixels:,} pixels")
+    return found
 
 
 def foreign_pictures(

@@ -400,6 +400,23 @@ def test_other_versions_draw_other_pictures_so_they_are_not_compared(
     assert found.notes[0].startswith("the pictures are not compared: pillow is ")
 
 
+def test_what_a_stranger_invents_is_a_problem_and_no_error(runs: Runs, tmp_path: Path) -> None:
+    told = with_episode(runs.script, 0, task_type="juggling")
+    told = with_step(told, 1, 1, verb="juggle", text="")
+    kinds = {each.kind for each in runs.checked(told, tmp_path).problems}
+    assert kinds == {"verdict", "claim", "task", "replay"}
+
+    def huge(talk: dict[str, Any]) -> None:
+        talk["settings"]["pictures"].update(min_pixels=10**12, max_pixels=10**12)
+
+    (problem,) = runs.checked(with_talk(runs.model, huge), tmp_path).problems
+    assert problem.kind == "picture"
+    assert "1,000,000,000,000 pixels" in problem.words
+    env = {**runs.script.header.manifest.env, "width": "wide"}
+    found = runs.checked(with_manifest(runs.script, env=env), tmp_path)
+    assert {each.kind for each in found.problems} == {"replay"}
+
+
 HEADER = b'{"format": "er-gym/submission/1"}\n'
 
 
