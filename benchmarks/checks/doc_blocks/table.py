@@ -175,6 +175,8 @@ SLOW: Mapping[str, tuple[str, ...]] = {
         "docs/commands.md: er-gym bench --tasks-file",
         "README.md: er-gym report",  # on those
         "docs/commands.md: er-gym report",  # on those
+        "docs/commands.md: er-gym submit",
+        "docs/commands.md: er-gym leaderboard check",
         "docs/start.md: er-gym report",  # on those
         "docs/commands.md: er-gym tasks generate",
         "docs/extending.md: er-gym tasks generate",
