@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,18 +12,18 @@ from er_gym.tasks.types import TASK_TYPES
 
 pytest.importorskip("sphinx", reason="needs the extra docs")
 
-from sphinx.cmd.build import main as build
 
-
-@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning", "ignore::DeprecationWarning")
 def test_every_link_leads_somewhere_and_every_page_is_listed(
-    repository: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    repository: Path, tmp_path: Path
 ) -> None:
-    # The builder "dummy" reads all pages and resolves their links, and writes nothing.
-    ended = build(
-        ["-q", "-W", "--keep-going", "-b", "dummy", str(repository / "docs"), str(tmp_path)]
-    )
-    assert ended == 0, capsys.readouterr().err
+    # In a process of its own, since Sphinx changes how modules are imported. The builder "dummy"
+    # reads all pages and resolves their links, and writes nothing.
+    build = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "dummy"]
+    ended = subprocess.run(
+        [*build, str(repository / "docs"), str(tmp_path)],
+        cwd=repository, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
 
 
 def test_each_environment_has_a_page_with_its_picture(repository: Path) -> None:
