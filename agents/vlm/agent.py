@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import replace
 from typing import Any
 
 from agents.vlm.chat import Client, ConversationRefused, Message, Picture, Reply, model_reply
-from agents.vlm.history import Limits, pictures_in, with_last_pictures
+from agents.vlm.history import Limits, pictures_in
 from agents.vlm.matching import Matcher
 from agents.vlm.parsing import ParsedReply, parse
-from agents.vlm.parsing.vocabulary import DECISION
 from agents.vlm.pictures import encode, noise_like
-from agents.vlm.prompt_set import Decide, LastAction, PromptSet, TurnContext, interleave_pictures
+from agents.vlm.prompt_set import LastAction, PromptSet, TurnContext, interleave_pictures
 from agents.vlm.record import (
     ConversationRecord,
     MessageRecord,
@@ -26,11 +23,17 @@ from agents.vlm.record import (
     settings_to_record,
 )
 from agents.vlm.reply_causes import causes_of
+from agents.vlm.requests import (
+    actions_of,
+    as_settings_have_it,
+    in_form,
+    said_by,
+    within_limits,
+)
 from agents.vlm.settings import AgentSettings
 from er_gym.data.dialects import shows_anew
 from er_gym.data.scene_text import Perceived
 from er_gym.envs.actions import NO_ACTION, Action, applies
-from er_gym.envs.actions import parse as read_action
 from er_gym.envs.feedback import told_in
 from er_gym.envs.info import detail, names
 from er_gym.envs.observations import text_without_task
@@ -125,7 +128,7 @@ class VLMAgent:
     def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """A person decides this step. The conversation goes on as if the model had decided it."""
         self._messages.append(self._turn(obs, info))
-        self._read(_in_form(action, self._settings.decide), info, by=PERSON)
+        self._read(in_form(action, self._settings.decide), info, by=PERSON)
 
     def _read(self, reply: Reply, info: Mapping[str, Any], by: By = "") -> Decision:
         """Read a reply, and add it to the conversation."""
@@ -133,7 +136,7 @@ class VLMAgent:
         parsed = parse(reply.text, reply.call, self._settings.decide)
         action, problem, matched = self._resolve(parsed, info)
         self._last_action = action
-        said = _said(reply)
+        said = said_by(reply)
         self._messages.append(Message("assistant", (said,), reply.reasoning))
         thoughts = [ThoughtRecord(kind=each.kind, text=each.text) for each in parsed.thoughts]
         self._rounds.append(
@@ -261,22 +264,17 @@ class VLMAgent:
 
     def _history(self) -> list[Message]:
         """The messages of the next request."""
-        messages = self._shown()
-        if self._limits == Limits():
-            return messages
-        done = {each.message: each.action for each in self._rounds if each.action}
-        form = self._settings.decide
-        return self._limits.applied(
-            messages, {place: _said(_in_form(action, form)) for place, action in done.items()}
+        return within_limits(
+            self._shown(), self._limits, actions_of(self._rounds), self._settings.decide
         )
 
     def _shown(self) -> list[Message]:
         """The messages as the settings have them, without regard to limits of the server."""
-        messages = self._messages
-        if not self._settings.reasoning.in_history:
-            messages = [replace(message, reasoning="") for message in messages]
-        keep = self._settings.pictures.keep
-        return messages if keep is None else with_last_pictures(messages, keep)
+        return as_settings_have_it(
+            self._messages,
+            in_history=self._settings.reasoning.in_history,
+            keep=self._settings.pictures.keep,
+        )
 
     def _trimmed(self) -> TrimmedRecord | None:
         """What the last request left out since the server has a limit; None for nothing."""
@@ -343,20 +341,6 @@ class VLMAgent:
         )
         files[f"{CONVERSATIONS}/{stem}.json"] = (record.model_dump_json(indent=1) + "\n").encode()
         return files
-
-
-def _said(reply: Reply) -> str:
-    """The words of a reply, as the conversation has them."""
-    return "\n".join(filter(None, (reply.text, reply.call))) or "(nothing)"
-
-
-def _in_form(action: Action | str, decide: Decide) -> Reply:
-    """The reply by which a model would decide on an action, without a thought."""
-    if isinstance(action, str):
-        action = read_action(action) or Action(action)
-    fields = json.dumps({"action": action.verb, "object": action.object_type})
-    texts = {"tags": f"<{DECISION}>{action}</{DECISION}>", "json": fields, "tools": ""}
-    return Reply(texts[decide], call=fields if decide == "tools" else "", finish="")
 
 
 def _unreadable_action(parsed: ParsedReply, said: str) -> str:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from agents.vlm.record import ConversationRecord, PictureRecord, RoundRecord
+from agents.vlm.record import ConversationRecord, MessageRecord, PictureRecord, RoundRecord
+from agents.vlm.requests import as_sent
 from benchmarks.monitor.failures import Failure, failure_of
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.rollout.judgement import judged_by_step
@@ -41,6 +42,7 @@ class StepView:
         thoughts: what the agent thought before it.
         raw: what the model said; "" for agents that are no models.
         round: the reply's record; None for such agents.
+        sent: the messages that were new in the request for it, the system message in the first.
         pictures: the numbers of the episode's pictures that the agent was shown for it.
         total: the reward so far.
         done: the numbers of the key actions that were done for the first time in it.
@@ -51,6 +53,7 @@ class StepView:
     thoughts: Sequence[ThoughtView]
     raw: str
     round: RoundRecord | None
+    sent: Sequence[MessageRecord]
     pictures: Sequence[int]
     total: float
     done: Sequence[int]
@@ -73,6 +76,7 @@ class EpisodeView:
         success: by the corrected scorer.
         tokens, cost: of the model's replies; 0 for agents that are no models.
         problem: why the conversation cannot be shown; "" if it can, or there is none.
+        conversation: the record of the conversation; None if there is none to show.
     """
 
     record: EpisodeRecord
@@ -83,6 +87,18 @@ class EpisodeView:
     tokens: int
     cost: float
     problem: str
+    conversation: ConversationRecord | None = None
+
+    def request(self, number: int) -> list[MessageRecord]:
+        """The request for a step, with all messages as they were sent.
+
+        Raises:
+            ValueError: no model was asked for this step.
+        """
+        step = self.steps[number] if 0 <= number < len(self.steps) else None
+        if step is None or step.round is None or step.round.by or self.conversation is None:
+            raise ValueError(f"no model was asked for step {number}")
+        return as_sent(self.conversation, self.conversation.rounds.index(step.round))
 
 
 def view_of(run: RunDirectory, key: str) -> EpisodeView:
@@ -104,6 +120,7 @@ def view_of(run: RunDirectory, key: str) -> EpisodeView:
         tokens=conversation.prompt_tokens + conversation.completion_tokens if conversation else 0,
         cost=conversation.cost if conversation else 0.0,
         problem=problem,
+        conversation=conversation,
     )
 
 
@@ -154,8 +171,10 @@ def _steps(
     for number, step in enumerate(record.steps):
         round_ = None if step.verb == INIT or step.appended else next(rounds, None)
         raw, shown = "", []
+        sent: Sequence[MessageRecord] = ()
         if round_ is not None and round_.message < len(messages):
-            for message in messages[read : round_.message]:
+            sent = messages[read : round_.message]
+            for message in sent:
                 for part in message.parts:
                     if isinstance(part, PictureRecord):
                         shown.append(len(pictures))
@@ -173,6 +192,7 @@ def _steps(
             thoughts=_thoughts(step, round_),
             raw=raw,
             round=round_,
+            sent=sent,
             pictures=shown,
             total=total,
             done=[number_of[id(key)] for key in newly],

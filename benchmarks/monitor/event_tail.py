@@ -6,11 +6,12 @@ import json
 import re
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic_core import from_json
 
 from benchmarks.monitor.line_tail import LineFollower, Lines
+from benchmarks.scoring.metrics import METRICS
 from er_gym.rollout.causes import EpisodeCauses
 from er_gym.rollout.outcomes import succeeded
 from er_gym.rollout.records import sample_of_key, task_of_key
@@ -21,6 +22,21 @@ _LINE = re.compile(
 )
 """How er-gym writes a step: its time, task, number, verb, type and reward; or any other line. Most
 lines are steps; to parse their thoughts, which are not shown here, would take most of the time."""
+
+
+class Figures(NamedTuple):
+    """What the record of an episode tells that the stream does not.
+
+    Attributes:
+        failure: why it failed (:mod:`benchmarks.monitor.failures`); "" for a success.
+        metrics: those of :data:`benchmarks.scoring.metrics.METRICS` by the corrected scorer; none
+            if its record cannot be read.
+        by_paper: success by the paper's scorer.
+    """
+
+    failure: str
+    metrics: tuple[float, ...] = ()
+    by_paper: bool = False
 
 
 @dataclass(slots=True)
@@ -39,6 +55,7 @@ class EpisodeRow:
         last: the last action.
         causes: of its unusable replies; None while it plays.
         before: while it is played again, the result that it had: it had crashed.
+        figures: what its record tells; None until it has been read.
     """
 
     key: str
@@ -59,6 +76,7 @@ class EpisodeRow:
     last: str = ""
     causes: EpisodeCauses | None = None
     before: EpisodeRow | None = None
+    figures: Figures | None = None
 
     @property
     def task_id(self) -> str:
@@ -74,6 +92,17 @@ class EpisodeRow:
     def result(self) -> EpisodeRow | None:
         """The row of its latest result; None if it has none yet."""
         return self.before if self.ended is None else self
+
+    @property
+    def failure(self) -> str:
+        """Why it failed; "" for a success, and until its record has been read."""
+        return self.figures.failure if self.figures else ""
+
+    def metric(self, name: str) -> float | None:
+        """One of :data:`benchmarks.scoring.metrics.METRICS`; None until its record has been
+        read."""
+        told = self.figures.metrics if self.figures else ()
+        return told[METRICS.index(name)] if told else None
 
     @property
     def outcome(self) -> str:

@@ -181,6 +181,7 @@ class _Maker:
         self._words = Translator(wanted.language)
         self._run = RunDirectory.open(root)
         with self._site.runs.use(directory) as view:
+            view.read_records(float("inf"))
             unknown = wanted.filter.unknown_type(view.choices()["type"])
             if unknown:
                 raise CannotExport(unknown)
@@ -196,7 +197,6 @@ class _Maker:
     def list_page(self) -> OfflinePage:
         """The run's page with all rows."""
         with self._site.runs.use(self.directory) as view:
-            view.count_failures(float("inf"))
             variables = run_variables(view, Filter())
             every = view.chosen(Filter())
             variables["page"] = Page(every, len(every), 1, 1)

@@ -10,10 +10,15 @@ from typing import Any, ClassVar
 
 from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.event_tail import EpisodeRow, EventTail
-from benchmarks.monitor.failure_counts import FailureCounts
 from benchmarks.monitor.fingerprint import in_use
 from benchmarks.monitor.followed import Followed
 from benchmarks.monitor.listing import AddressFilter
+from benchmarks.monitor.record_figures import (
+    BESIDE_SUCCESS,
+    FailureCounts,
+    Means,
+    RecordFigures,
+)
 from benchmarks.monitor.record_rows import RecordRows
 from benchmarks.monitor.spending_tail import SpendingTail
 from benchmarks.scoring.metrics import success_rate
@@ -36,6 +41,9 @@ SORTS: Mapping[str, Callable[[EpisodeRow], Any]] = {
     "scene": lambda row: _room_number(row.scene),
     "outcome": lambda row: row.outcome,
     "reason": lambda row: row.end_reason,
+    "failure": lambda row: row.failure,
+    "efficiency": lambda row: row.metric("search_efficiency") or 0.0,
+    "completeness": lambda row: row.metric("completeness") or 0.0,
     "steps": lambda row: row.steps,
     "reward": lambda row: row.reward,
     "tokens": lambda row: row.tokens,
@@ -55,7 +63,7 @@ class Filter(AddressFilter[EpisodeRow]):
     """Which episodes of a run are shown.
 
     Attributes:
-        scene, outcome, reason: exact values; "" for any.
+        scene, outcome, failure, reason: exact values; "" for any.
         steps: ``5``, ``5-10``, ``-10`` or ``5-``; "" for any.
     """
 
@@ -63,13 +71,19 @@ class Filter(AddressFilter[EpisodeRow]):
 
     scene: str = ""
     outcome: str = ""
+    failure: str = ""
     reason: str = ""
     steps: str = ""
     sort: str = "-ended"
 
     def takes(self, row: EpisodeRow) -> bool:
         """Whether a row is shown."""
-        exact = {"scene": row.scene, "outcome": row.outcome, "reason": row.end_reason}
+        exact = {
+            "scene": row.scene,
+            "outcome": row.outcome,
+            "failure": row.failure,
+            "reason": row.end_reason,
+        }
         said = f"{row.key} {row.instruction}"
         return self.matches(row.task_type, exact, said) and _within(row.steps, self.steps)
 
@@ -171,17 +185,18 @@ class RunView:
 
     Attributes:
         directory: where it is.
-        failures: why its episodes failed.
+        figures: what its records tell.
     """
 
     directory: Directory
-    failures: FailureCounts = field(default_factory=FailureCounts)
+    figures: RecordFigures = field(default_factory=RecordFigures)
     _tail: EventTail = field(init=False)
     _records: RecordRows = field(init=False)
     _spending: SpendingTail = field(init=False)
     _rows: Mapping[str, EpisodeRow] = field(default_factory=dict)
     _manifest: Manifest | None = None
     _problem: str = ""
+    _means: tuple[object, tuple[Means | None, Mapping[str, Means]]] | None = None
 
     def __post_init__(self) -> None:
         self._tail = EventTail(self.directory.path / EVENTS)
@@ -200,13 +215,32 @@ class RunView:
         self._spending.read()
         self._rows = self._records.agreeing(self._tail.rows)
 
-    def count_failures(self, seconds: float) -> None:
-        """Read why episodes failed, for a while."""
+    def read_records(self, seconds: float) -> None:
+        """Read records of episodes, for a while."""
         try:
             run = RunDirectory.open(self.directory.path)
         except (RunDirectoryError, OSError):
             return
-        self.failures.read(run, self._rows, seconds)
+        self.figures.read(run, self._rows, seconds)
+
+    @property
+    def failures(self) -> FailureCounts:
+        """Why episodes failed, as far as their records have been read."""
+        return FailureCounts.of(self._rows.values())
+
+    def means(self) -> tuple[Means | None, Mapping[str, Means]]:
+        """The metrics over all episodes whose records have been read, and those that stand beside
+        success by group."""
+        at = self.figures.done, self._tail.version, len(self._rows)
+        if self._means is None or self._means[0] != at:
+            rows = self._rows.values()
+            told = {
+                name: Means.of(some, BESIDE_SUCCESS)
+                for name, some in group_by(rows, lambda row: _group(row.task_type)).items()
+            }
+            by_group = {name: means for name, means in told.items() if means is not None}
+            self._means = at, (Means.of(rows), by_group)
+        return self._means[1]
 
     @property
     def rows(self) -> Mapping[str, EpisodeRow]:
@@ -262,6 +296,8 @@ class RunView:
 
     def chosen(self, filter: Filter) -> list[EpisodeRow]:
         """The rows that a filter takes, sorted."""
+        if filter.failure:
+            self.read_records(0.0)
         return filter.chosen(self._rows.values())
 
     def success_counts(self) -> tuple[list[SuccessCount], list[SuccessCount]]:
@@ -296,6 +332,7 @@ class RunView:
             "type": sorted({row.task_type for row in rows}),
             "scene": sorted({row.scene for row in rows}, key=_room_number),
             "outcome": sorted({row.outcome for row in rows}),
+            "failure": sorted({row.failure for row in rows} - {""}),
             "reason": sorted({row.end_reason for row in rows} - {""}),
         }
 

@@ -6,7 +6,6 @@ import hashlib
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from copy import deepcopy
 from typing import Any, TypeAlias
 from urllib.parse import urlencode
 
@@ -20,9 +19,9 @@ from benchmarks.monitor.decided_on import decided_on
 from benchmarks.monitor.directories import Directories, Directory, Kind
 from benchmarks.monitor.episode_view import MOST_TEXT
 from benchmarks.monitor.event_tail import EpisodeRow
-from benchmarks.monitor.failure_counts import FailureCounts
 from benchmarks.monitor.fingerprint import fingerprint
 from benchmarks.monitor.language import Translator, chosen_language
+from benchmarks.monitor.record_figures import FailureCounts
 from benchmarks.monitor.run_view import RunSummary, run_views
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import Manifest, RunDirectory
@@ -34,8 +33,8 @@ LANGUAGE = "er-gym-language"
 AN_HOUR = {"Cache-Control": "private, max-age=3600"}
 """For what does not change: pictures."""
 
-_COUNT_SECONDS = 0.1
-"""How long failures are counted at a time, while a page waits."""
+READ_SECONDS = 0.1
+"""How long records are read at a time, while a page waits; the rest follows while it is open."""
 _MOST_ASKED = 2000
 
 
@@ -166,8 +165,8 @@ class Site:
     def failures(self, directory: Directory) -> FailureCounts:
         """Why a run's episodes failed, as far as that has been counted."""
         with self.runs.use(directory) as view:
-            view.count_failures(_COUNT_SECONDS)
-            return deepcopy(view.failures)
+            view.read_records(READ_SECONDS)
+            return view.failures
 
     def version(self, directory: Directory, closely: bool = False) -> object:
         """What changes whenever a directory does.
@@ -180,9 +179,9 @@ class Site:
             return fingerprint(directory)
         with self.runs.use(directory) as view:
             if closely:
-                view.count_failures(_COUNT_SECONDS)
+                view.read_records(READ_SECONDS)
             summary = view.summary()
-            return summary.version, summary.state, view.failures.done
+            return summary.version, summary.state, view.figures.done
 
     def state_of(self, of: str, closely: bool = False) -> str:
         """What changes whenever some directories do, 16 hex digits.

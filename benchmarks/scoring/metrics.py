@@ -290,13 +290,11 @@ def summarise(scores: Sequence[Score]) -> Summary:
         ValueError: there are no scores.
     """
     tasks = [each.task_id for each in scores]
-    rate = success_rate(tasks, [each.success for each in scores])
     several = most_samples(scores) > 1
-    means = {}
-    for metric in METRICS[1:]:
-        values = [getattr(each, metric) for each in scores]
-        mean = _between(tasks, values) if several else normal(values)
-        means[metric] = _within(mean, max(1.0, *values))
+    means = {
+        metric: estimate_of(metric, tasks, [getattr(each, metric) for each in scores], several)
+        for metric in METRICS
+    }
     told = {name: [getattr(each, name) for each in scores] for name in IF_TOLD}
     if None not in told[TIDY]:
         means[TIDY] = success_rate(tasks, told[TIDY])
@@ -304,7 +302,26 @@ def summarise(scores: Sequence[Score]) -> Summary:
         effects = told[SIDE_EFFECTS]
         mean = _between(tasks, effects) if several else normal(effects)
         means[SIDE_EFFECTS] = _within(mean, max(effects))
-    return Summary(len(scores), {"success": rate, **means})
+    return Summary(len(scores), means)
+
+
+def estimate_of(
+    metric: str, tasks: Sequence[str], values: Sequence[float], several: bool
+) -> Estimate:
+    """The mean of a metric over episodes, as :func:`summarise` has it.
+
+    Args:
+        metric: one of :data:`METRICS`.
+        tasks, values: (n,) the task of each episode, and its value.
+        several: whether tasks were played several times.
+
+    Raises:
+        ValueError: there are no episodes.
+    """
+    if metric == "success":
+        return success_rate(tasks, [bool(value) for value in values])
+    mean = _between(tasks, values) if several else normal(values)
+    return _within(mean, max(1.0, *values))
 
 
 def summarise_by(

@@ -51,7 +51,7 @@ def test_no_address_leads_out_of_the_folders(folder, serve, visit):
         status, text = server.raw(path.format(id=directory.id))
         assert status in (307, 400, 404), path
         assert SECRET not in text, path
-    for name in ("episode", "picture", "map", "frame"):
+    for name in ("episode", "picture", "map", "frame", "request"):
         for asked in KEYS:
             answer = client.get(
                 f"/runs/{directory.id}/{name}", params={"key": asked.format(key=key)}
@@ -59,8 +59,9 @@ def test_no_address_leads_out_of_the_folders(folder, serve, visit):
             assert answer.status_code == 404, (name, asked)
             assert SECRET not in answer.text
     for n in ("-1", "99999999999999999999", "1.5", "٣", "x"):
-        answer = client.get(f"/runs/{directory.id}/frame", params={"key": key, "n": n})
-        assert answer.status_code in (404, 422), n
+        for name in ("frame", "request"):
+            answer = client.get(f"/runs/{directory.id}/{name}", params={"key": key, "n": n})
+            assert answer.status_code in (404, 422), (name, n)
 
 
 def test_only_get_is_answered(folder, visit):

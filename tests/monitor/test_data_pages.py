@@ -66,7 +66,7 @@ def said(text: str) -> str:
 
 def rows(text: str) -> list[str]:
     return re.findall(
-        r"<tr[^>]*>\n<td><a href=.*?</tr>", text[text.index('id="rows"') :], re.DOTALL
+        r"<tr[^>]*>\n<td[^>]*><a href=.*?</tr>", text[text.index('id="rows"') :], re.DOTALL
     )
 
 

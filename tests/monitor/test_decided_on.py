@@ -17,17 +17,17 @@ def test_a_step_of_a_run_has_the_picture_that_it_was_decided_on(runs, tmp_path, 
     run = RunDirectory.open(folder)
     record = next(each for each in run.episodes() if len(each.steps) > 5)
     (folder / PICTURES).mkdir()
-    messages, rounds = [], []
+    messages, rounds = [MessageRecord(role="system", parts=["You are the system prompt."])], []
     for number in range(1, len(record.steps)):
         path = f"{PICTURES}/{number}.jpg"
         (folder / path).write_bytes(b"step %d" % number)
         shown = [PictureRecord(path=path, digest="", width=4, height=3)] if number != 3 else []
-        messages.append(MessageRecord(role="user", parts=["see", *shown]))
+        messages.append(MessageRecord(role="user", parts=[f"see for {number}", *shown]))
         messages.append(MessageRecord(role="assistant", parts=[f"said for step {number}"]))
         rounds.append(RoundRecord(message=len(messages) - 1))
     told = ConversationRecord(
         task_id=record.task_id, scene=record.scene, instruction=record.instruction,
-        agent=record.agent, settings={}, prompts="", prompts_digest="",
+        agent=record.agent, settings={"pictures": {"keep": 1}}, prompts="", prompts_digest="",
         messages=messages, rounds=rounds, prompt_tokens=0, completion_tokens=0, cost=0.0,
     )  # fmt: skip
     (folder / CONVERSATIONS).mkdir()
@@ -46,3 +46,17 @@ def test_a_step_of_a_run_has_the_picture_that_it_was_decided_on(runs, tmp_path, 
         told = page.split(f'id="step-{step}"')[1].partition("</li>")[0]
         assert (f"said for step {step}" in told) == (step > 0)
         assert stand == max(step - 1, 0)
+
+    # What was new in each request stands beside its step; the request itself leaves pictures out.
+    assert "You are the system prompt." in page.split('id="step-1"')[1].partition("</li>")[0]
+    request = client.get(f"{address}/request", params={"key": record.key, "n": 4}).text
+    assert [text for n in range(1, 6) if (text := f"see for {n}") in request] == [
+        "see for 1", "see for 2", "see for 3", "see for 4",
+    ]  # fmt: skip
+    assert request.count("You are the system prompt.") == 1
+    assert request.count("[picture no longer shown]") == 1  # of 1; 2 is kept, 3 had none
+    assert re.findall(r'src="([^"]+n=\d+)"', request) == [
+        f"{address}/picture?key={record.key}&amp;n={n}" for n in (1, 2)
+    ]
+    for n in (0, len(record.steps)):
+        assert client.get(f"{address}/request?key={record.key}&n={n}").status_code == 404

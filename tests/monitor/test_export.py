@@ -221,10 +221,10 @@ def test_a_browser_opens_it_from_the_disk(runs, tmp_path):
         short = rows.count()  # the list opens with what was chosen
         assert short < 8
         assert rows.first.locator("a[href]").count() == 1
-        assert page.get_by_label("Steps").input_value() == "-10"
+        assert page.locator("[name=steps]").input_value() == "-10"
         page.get_by_role("link", name="Clear").click()
         assert rows.count() == 8
-        page.get_by_label("Steps").fill("-10")
+        page.locator("[name=steps]").fill("-10")
         page.get_by_role("button", name="Filter").click()
         assert rows.count() == short
         page.get_by_role("link", name="Clear").click()

@@ -94,7 +94,10 @@ def test_it_is_shown_and_changes_nothing(text, tmp_path, manifest, episode, visi
     every = {directory.name: directory for directory in Directories([tmp_path]).all()}
     (hostile,) = (each for each in every.values() if "plain" not in each.name)
     (harmless,) = (each for each in every.values() if "plain" in each.name)
-    for page in ("/runs/{id}", "/runs/{id}/episode?key={key}", "/runs/{id}?text={text}"):
+    for page in (
+        "/runs/{id}", "/runs/{id}/episode?key={key}", "/runs/{id}?text={text}",
+        "/runs/{id}/request?key={key}",
+    ):  # fmt: skip
         answers = [
             client.get(page.format(id=directory.id, key=name, text="%3Cscript%3E%22"))
             for directory, name in ((hostile, key), (harmless, plain))

@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import threading
+from collections import Counter
 from pathlib import Path
 from typing import get_args
 from xml.etree import ElementTree
@@ -24,6 +25,8 @@ from benchmarks.monitor.failures import FAILURES, Failure, failure_of
 from benchmarks.monitor.language import words_in
 from benchmarks.monitor.run_view import Filter
 from benchmarks.monitor.site import Site
+from benchmarks.scoring.metrics import score_episode, summarise
+from benchmarks.scoring.scorers import CORRECTED
 from er_gym.rollout.run_directory import SPENDING, RunDirectory
 from er_gym.tasks.types import canonical_names
 from er_gym.writing import file_stem
@@ -191,6 +194,24 @@ def test_a_run_tells_success_why_it_failed_and_the_papers_rows(client, ids):
     assert re.search(r"\d of 8 failed episodes read", text)
     for figure in ("Qwen2-VL-7B", "Interactor", "Explorer", "Reasoner", "81.0 %", "65.2 %"):
         assert figure in text
+
+
+def test_a_run_tells_the_metrics_of_bench_and_is_filtered_by_how_episodes_failed(ids, runs, visit):
+    client, address = visit(runs), f"/runs/{ids['random']}"
+    while "records read so far" in (text := client.get(address).text):
+        pass
+    assert "by the corrected scorer" in said(text)
+    episodes = list(RunDirectory.open(runs / "random").episodes())
+    means = summarise([score_episode(each, CORRECTED) for each in episodes])
+    for name, mean in means.metrics.items():
+        row = text.split(f'<tr data-row="{name}">')[1].partition("</tr>")[0]
+        low_to_high = f"{100 * mean.low:.1f} to {100 * mean.high:.1f}"
+        assert f"{100 * mean.mean:.1f} %" in row and low_to_high in row, name
+    failures = Counter(failure_of(each) or "" for each in episodes)
+    assert len(failures) > 1
+    for failure in FAILURES:
+        found = rows(client.get(address, params={"failure": failure}).text)
+        assert len(found) == failures[failure], failure
 
 
 def test_an_episode_shows_every_step_and_the_key_actions(client, ids, runs):

@@ -74,9 +74,9 @@ class ComparePages:
         variables = {
             "runs": [summary for summary, _ in runs],
             "failures": [
-                (kind, [counted.number(kind) for counted in counts])
+                (kind, [counted.numbers[kind] for counted in counts])
                 for kind in FAILURES
-                if any(counted.number(kind) for counted in counts)
+                if any(counted.numbers[kind] for counted in counts)
             ],
             "settings": settings,
             "unlike": [one.name for one in settings if one.differs and one.matters],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
+from urllib.parse import urlencode
 
 from fastapi import Request, Response
 
@@ -33,6 +34,7 @@ class EpisodePages(ReplayPages):
         """The pages by address."""
         return {
             "/runs/{id}/episode": self.episode,
+            "/runs/{id}/request": self.request,
             "/runs/{id}/video": self.video,
             **super().routes(),
         }
@@ -61,6 +63,30 @@ class EpisodePages(ReplayPages):
             "scripts": ("episode.js", "enlarge.js"),
         }
         return self._site.show(request, "episode.html", variables)
+
+    def request(self, request: Request, id: str, key: str = "", n: int = 1) -> Response:
+        """What a model was sent for a step: every message as it was sent."""
+        directory = self._site.directory(id, "run")
+        with or_nothing():
+            episode = view_of(RunDirectory.open(directory.path), key)
+            messages = episode.request(n)
+        address = f"/runs/{id}/picture?"
+        parts = [part for each in messages for part in each.parts]
+        variables = {
+            "run": self._site.summary(directory),
+            "key": key,
+            "number": n,
+            "last": len(episode.steps),
+            "step": episode.steps[n],
+            "messages": messages,
+            "pictures": sum(not isinstance(part, str) for part in parts),
+            "addresses": {
+                each.path: address + urlencode({"key": key, "n": number})
+                for number, each in enumerate(episode.pictures)
+            },
+            "scripts": ("enlarge.js",),
+        }
+        return self._site.show(request, "request.html", variables)
 
     def _unreadable(
         self, request: Request, directory: Directory, row: EpisodeRow, chosen: Filter, why: str

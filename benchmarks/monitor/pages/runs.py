@@ -10,12 +10,13 @@ from fastapi import Request, Response
 from benchmarks.monitor.listing import page_of
 from benchmarks.monitor.run_view import Filter, RunView
 from benchmarks.monitor.settings_view import settings_of
-from benchmarks.monitor.site import Routes, Site
+from benchmarks.monitor.site import READ_SECONDS, Routes, Site
+from benchmarks.scoring.scorers import CORRECTED
 from benchmarks.study.paper_rungs import PAPER
 from er_gym.tasks.types import COMPOSITE, MANIPULATE, SEARCH, TRANSPORT
 
-_COUNT_SECONDS = 0.1
-"""How long a page may wait for failures to be counted; the rest follows while it is open."""
+_FILTER_SECONDS = 1.0
+"""How long a page that is filtered by what records tell waits for them to be read."""
 _PAPER_GROUPS = (SEARCH, MANIPULATE, TRANSPORT, COMPOSITE)
 """The groups, in the order of the paper's table."""
 
@@ -32,7 +33,7 @@ def run_variables(view: RunView, chosen: Filter) -> dict[str, Any]:
     """What the page of a run says."""
     groups, types = view.success_counts()
     choices = view.choices()
-    summary = view.summary()
+    summary, (means, means_by_group) = view.summary(), view.means()
     return {
         "run": summary,
         "settings": settings_of([summary]),
@@ -44,6 +45,10 @@ def run_variables(view: RunView, chosen: Filter) -> dict[str, Any]:
         "choices": choices,
         "unknown": chosen.unknown_type(choices["type"]),
         "failures": view.failures,
+        "means": means,
+        "means_by_group": means_by_group,
+        "read": (view.figures.done, sum(row.ended is not None for row in view.rows.values())),
+        "scorer": CORRECTED.name,
         "paper": _paper_rows(),
     }
 
@@ -72,6 +77,6 @@ class RunPages:
         directory = self._site.directory(id, "run")
         chosen = Filter.of(request.query_params)
         with self._site.runs.use(directory) as view:
-            view.count_failures(_COUNT_SECONDS)
+            view.read_records(_FILTER_SECONDS if chosen.failure else READ_SECONDS)
             variables = run_variables(view, chosen)
         return self._site.show(request, "run.html", {**variables, "live": id})

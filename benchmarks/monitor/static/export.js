@@ -26,7 +26,7 @@
       return (!low || number >= Number(low)) && (!high || number <= Number(high));
     };
     const takes = (told) =>
-      ["type", "scene", "outcome", "reason"].every((name) => !query.get(name) || query.get(name) === told[name]) &&
+      ["type", "scene", "outcome", "failure", "reason"].every((name) => !query.get(name) || query.get(name) === told[name]) &&
       within(told.steps, query.get("steps") || "") &&
       (!query.get("text") || told.text.includes(query.get("text").toLowerCase()));
     const show = () => {

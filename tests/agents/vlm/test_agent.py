@@ -23,6 +23,7 @@ from agents.vlm.clients.scripted import RecordedClient, ScriptedClient
 from agents.vlm.matching import Matcher
 from agents.vlm.prompts import load_prompts
 from agents.vlm.record import ConversationRecord
+from agents.vlm.requests import as_sent
 from agents.vlm.settings import AgentSettings
 from er_gym import EmbodiedEnv
 from er_gym.rollout.play import play_episode
@@ -175,7 +176,8 @@ def test_only_the_last_pictures_are_kept_where_that_is_asked_for(
     env: Callable[..., EmbodiedEnv],
 ) -> None:
     script = Script(*decided("observe", *WAY))
-    play(env("rgb"), script, settings(sees="pictures", pictures={"keep": 2}))
+    agent, episode = play(env("rgb"), script, settings(sees="pictures", pictures={"keep": 2}))
+    check_requests(left_by(agent, episode)[0], script.sent)
     numbers = [len(pictures(sent)) for sent in script.sent]
     assert numbers == [1, 1 + 4, 2 + 1, 2 + 1, *[2 + 1] * (len(numbers) - 4)]
     left_out = [sum(part == LEFT_OUT for m in sent for part in m.parts) for sent in script.sent]
@@ -192,6 +194,21 @@ def test_thoughts_of_reasoning_models_go_back_if_asked(
     assert [message.reasoning for message in said] == ["hm" if given_back else ""]
     record, _ = left_by(agent, episode)
     assert [m.reasoning for m in record.messages if m.role == "assistant"] == ["hm", "hm"]
+    check_requests(record, script.sent)
+
+
+def check_requests(record: ConversationRecord, sent: Sequence[Sequence[Message]]) -> None:
+    """The record tells each request as it was."""
+
+    def plain(messages: Sequence[Any]) -> list[Any]:
+        return [
+            (each.role, each.reasoning, [p if isinstance(p, str) else p.digest for p in each.parts])
+            for each in messages
+        ]
+
+    assert len(record.rounds) == len(sent)
+    for number, messages in enumerate(sent):
+        assert plain(as_sent(record, number)) == plain(messages), number
 
 
 # -- replies that are not as they should be --------------------------------------------------------
@@ -336,6 +353,7 @@ def test_the_oldest_pictures_are_left_out_where_a_server_takes_no_more(
     assert [each.causes for each in episode.steps[1:]] == [[], *[["trimmed"]] * (len(numbers) - 1)]
     again = ConversationRecord.model_validate_json(record.model_dump_json())
     assert again == record
+    check_requests(record, script.sent)
     assert "trimmed" not in record.rounds[0].model_dump()  # as older versions wrote it
 
 
@@ -357,6 +375,7 @@ def test_the_oldest_words_are_left_out_where_the_context_is_full(
     assert form[decide] in texts(reply)  # what it did stays
     assert "so so" not in texts(reply)
     assert [each.trimmed.messages for each in agent.rounds if each.trimmed] == [2]
+    check_requests(left_by(agent, episode)[0], script.sent)
 
 
 def test_an_episode_over_a_limit_ends_with_its_cause(env: Callable[..., EmbodiedEnv]) -> None:
