@@ -20,6 +20,7 @@ from benchmarks.monitor.pages.compare import ComparePages
 from benchmarks.monitor.pages.data import DataPages
 from benchmarks.monitor.pages.episodes import EpisodePages
 from benchmarks.monitor.pages.live import LivePages
+from benchmarks.monitor.pages.noting import NotingPages
 from benchmarks.monitor.pages.play import PlayPages
 from benchmarks.monitor.pages.runs import RunPages
 from benchmarks.monitor.pages.static import StaticPages
@@ -97,6 +98,7 @@ def make_app(
     for pages in every:
         for path, page in pages.routes().items():
             app.add_api_route(path, page, methods=["GET"], response_class=HTMLResponse)
+    NotingPages(site).add_to(app)
     playing.add_to(app)
     return app
 

@@ -11,7 +11,7 @@ from benchmarks.monitor.charts import as_svg
 from benchmarks.monitor.collection_index import CollectionIndex, TrajectoryHead
 from benchmarks.monitor.flow import flow
 from benchmarks.monitor.language import Translator
-from benchmarks.monitor.listing import AddressFilter
+from benchmarks.monitor.listing import TaskFilter
 from benchmarks.scoring.series import Axis, Chart, Series, points
 from er_gym.data import paper_figures as paper
 from er_gym.data.statistics import STATES, mean_and_most
@@ -29,7 +29,7 @@ SORTS: Mapping[str, Callable[[TrajectoryHead], Any]] = {
 
 
 @dataclass(frozen=True)
-class DataFilter(AddressFilter[TrajectoryHead]):
+class DataFilter(TaskFilter[TrajectoryHead]):
     """Which trajectories of a collection are shown.
 
     Attributes:

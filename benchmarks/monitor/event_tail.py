@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from pydantic_core import from_json
 
 from benchmarks.monitor.line_tail import LineFollower, Lines
+from benchmarks.monitor.notes import Note
 from benchmarks.scoring.metrics import METRICS
 from er_gym.rollout.causes import EpisodeCauses
 from er_gym.rollout.outcomes import succeeded
@@ -56,6 +57,7 @@ class EpisodeRow:
         causes: of its unusable replies; None while it plays.
         before: while it is played again, the result that it had: it had crashed.
         figures: what its record tells; None until it has been read.
+        note: what people noted of it; None for nothing.
     """
 
     key: str
@@ -77,6 +79,7 @@ class EpisodeRow:
     causes: EpisodeCauses | None = None
     before: EpisodeRow | None = None
     figures: Figures | None = None
+    note: Note | None = None
 
     @property
     def task_id(self) -> str:

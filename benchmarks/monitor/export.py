@@ -41,7 +41,7 @@ from benchmarks.monitor.language import Translator
 from benchmarks.monitor.listing import Page
 from benchmarks.monitor.pages.replays import PICTURE_KINDS, drawn_room, no_room
 from benchmarks.monitor.pages.runs import run_variables
-from benchmarks.monitor.run_view import SORTS, Filter
+from benchmarks.monitor.run_view import FLAG, SORTS, Filter
 from benchmarks.monitor.site import Site
 from benchmarks.monitor.world import CannotReplay, Worlds
 from er_gym.data.pictures import encode_picture
@@ -119,8 +119,9 @@ class Exported:
     def row(self, row: EpisodeRow) -> str:
         """What the script needs to filter and to sort a row, as JSON."""
         values = {name: _sortable(key(row)) for name, key in SORTS.items()}
-        text = f"{row.key} {row.instruction}".casefold()[:_MOST_TEXT]
-        return json.dumps({**values, "scene": row.scene, "text": text})
+        noted = (row.note.text, FLAG if row.note.flag else "note") if row.note else ("", "")
+        text = f"{row.key} {row.instruction} {noted[0]}".casefold()[:_MOST_TEXT]
+        return json.dumps({**values, "scene": row.scene, "text": text, "note": noted[1]})
 
 
 def export(
@@ -188,6 +189,7 @@ class _Maker:
             rows = [row for row in view.chosen(wanted.filter) if row.ended]
             self.keys = [row.key for row in rows[: wanted.episodes]]
             total = sum(row.ended is not None for row in view.rows.values())
+            self._notes = view.noted.notes.episodes
         self._numbers = {key: number for number, key in enumerate(self.keys, 1)}
         types = {row.task_type for row in rows}
         # The script knows types by their full names alone.
@@ -229,6 +231,7 @@ class _Maker:
             "episode": episode,
             "filter": Filter(),
             "before": self.keys[at - 1] if at else "",
+            "note": self._notes.get(key),
             "after": self.keys[at + 1] if at + 1 < len(self.keys) else "",
             "exported": changed(self.exported, map=lambda: self._map(episode)),
         }

@@ -26,16 +26,13 @@ class AddressFilter(Generic[Row]):
 
     Attributes:
         sorts: what rows are sorted by, for each name of an order.
-        type: any name of a type of task or of a group, which stands for its types
-            (:func:`er_gym.tasks.types.types_named`); "" for any.
         text: part of what a row says, whatever the case.
         sort: one of ``sorts``; with ``-`` before it, descending.
-        page: from 1.
+        page: from 1; 0 for the whole list.
     """
 
     sorts: ClassVar[Mapping[str, Callable[[Any], Any]]] = {}
 
-    type: str = ""
     text: str = ""
     sort: str = ""
     page: int = 1
@@ -72,6 +69,22 @@ class AddressFilter(Generic[Row]):
         taken.sort(key=key, reverse=self.sort.startswith("-"))
         return taken
 
+    def says(self, said: str) -> bool:
+        """Whether a row is shown as far as its words tell."""
+        return not self.text or self.text.casefold() in said.casefold()
+
+
+@dataclass(frozen=True)
+class TaskFilter(AddressFilter[Row]):
+    """Which rows of a list of tasks are shown.
+
+    Attributes:
+        type: any name of a type of task or of a group, which stands for its types
+            (:func:`er_gym.tasks.types.types_named`); "" for any.
+    """
+
+    type: str = ""
+
     def matches(self, type: str, exact: Mapping[str, str], said: str) -> bool:
         """Whether a row is shown as far as these tell.
 
@@ -83,7 +96,7 @@ class AddressFilter(Generic[Row]):
         return (
             self.takes_type(type)
             and all(getattr(self, name) in ("", value) for name, value in exact.items())
-            and (not self.text or self.text.casefold() in said.casefold())
+            and self.says(said)
         )
 
     def takes_type(self, name: str) -> bool:
@@ -129,13 +142,18 @@ class Page(Generic[Row]):
 
 
 def page_number(parameters: Mapping[str, str]) -> int:
-    """The page that an address asks for, from 1; 1 if it makes no sense."""
+    """The page that an address asks for, from 1; 1 if it makes no sense. 0, the whole list, if it
+    asks for a file."""
+    if parameters.get("as"):
+        return 0
     text = parameters.get("page", "")
     return max(1, min(int(text[:7]), _MOST_PAGES)) if text.isascii() and text.isdigit() else 1
 
 
 def page_of(rows: Sequence[Row], number: int) -> Page[Row]:
-    """A page of a list; the last one if it has fewer."""
+    """A page of a list; the last one if it has fewer, and the whole list for 0."""
+    if not number:
+        return Page(rows, len(rows), 1, 1)
     last = max(1, -(-len(rows) // PAGE_ROWS))
     number = min(number, last)
     return Page(rows[(number - 1) * PAGE_ROWS : number * PAGE_ROWS], len(rows), number, last)

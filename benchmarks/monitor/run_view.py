@@ -12,7 +12,8 @@ from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.event_tail import EpisodeRow, EventTail
 from benchmarks.monitor.fingerprint import in_use
 from benchmarks.monitor.followed import Followed
-from benchmarks.monitor.listing import AddressFilter
+from benchmarks.monitor.listing import TaskFilter
+from benchmarks.monitor.notes import NotesTail
 from benchmarks.monitor.record_figures import (
     BESIDE_SUCCESS,
     FailureCounts,
@@ -29,6 +30,7 @@ from er_gym.rollout.events import EVENTS, Cost
 from er_gym.rollout.run_directory import SPENDING, Manifest, RunDirectory, RunDirectoryError
 from er_gym.tasks.types import task_type
 
+FLAG = "flag"
 _SILENT_SECONDS = 120.0
 """A run without a lock and without an event for so long is not counted as playing."""
 _RECENT_SECONDS = 60.0
@@ -59,11 +61,13 @@ def _room_number(scene: str) -> tuple[int, str]:
 
 
 @dataclass(frozen=True)
-class Filter(AddressFilter[EpisodeRow]):
+class Filter(TaskFilter[EpisodeRow]):
     """Which episodes of a run are shown.
 
     Attributes:
         scene, outcome, failure, reason: exact values; "" for any.
+        note: ``flag`` for those that are flagged, ``note`` for all of which something is noted; ""
+            for any.
         steps: ``5``, ``5-10``, ``-10`` or ``5-``; "" for any.
     """
 
@@ -73,6 +77,7 @@ class Filter(AddressFilter[EpisodeRow]):
     outcome: str = ""
     failure: str = ""
     reason: str = ""
+    note: str = ""
     steps: str = ""
     sort: str = "-ended"
 
@@ -84,8 +89,13 @@ class Filter(AddressFilter[EpisodeRow]):
             "failure": row.failure,
             "reason": row.end_reason,
         }
-        said = f"{row.key} {row.instruction}"
-        return self.matches(row.task_type, exact, said) and _within(row.steps, self.steps)
+        noted = row.note.text if row.note else ""
+        said = f"{row.key} {row.instruction} {noted}"
+        return (
+            self.matches(row.task_type, exact, said)
+            and _within(row.steps, self.steps)
+            and (not self.note or (row.note is not None and (self.note != FLAG or row.note.flag)))
+        )
 
 
 def _within(number: int, bounds: str) -> bool:
@@ -159,6 +169,7 @@ class RunSummary:
         begun: when its first episode began, seconds since the epoch; 0 if unknown.
         samples: how often a task was played, at most.
         causes: the causes of unusable replies, a line for each.
+        tags: that people gave it.
         version: changes when anything does.
     """
 
@@ -176,7 +187,8 @@ class RunSummary:
     begun: float
     samples: int
     causes: Sequence[str]
-    version: int
+    tags: Sequence[str]
+    version: object
 
 
 @dataclass
@@ -186,6 +198,7 @@ class RunView:
     Attributes:
         directory: where it is.
         figures: what its records tell.
+        noted: what people noted of it.
     """
 
     directory: Directory
@@ -193,6 +206,7 @@ class RunView:
     _tail: EventTail = field(init=False)
     _records: RecordRows = field(init=False)
     _spending: SpendingTail = field(init=False)
+    noted: NotesTail = field(init=False)
     _rows: Mapping[str, EpisodeRow] = field(default_factory=dict)
     _manifest: Manifest | None = None
     _problem: str = ""
@@ -202,6 +216,7 @@ class RunView:
         self._tail = EventTail(self.directory.path / EVENTS)
         self._records = RecordRows(self.directory.path)
         self._spending = SpendingTail(self.directory.path / SPENDING)
+        self.noted = NotesTail(self.directory.path)
 
     def read(self) -> None:
         """Read what is new."""
@@ -214,6 +229,18 @@ class RunView:
         self._tail.read()
         self._spending.read()
         self._rows = self._records.agreeing(self._tail.rows)
+        self._tell_notes()
+
+    def _tell_notes(self) -> None:
+        """Tell rows what is noted of them. Few have a note, and a row may be another object now."""
+        before = self.noted.notes.episodes
+        self.noted.read()
+        for key in before:
+            if key in self._rows:
+                self._rows[key].note = None
+        for key, note in self.noted.notes.episodes.items():
+            if key in self._rows:
+                self._rows[key].note = note
 
     def read_records(self, seconds: float) -> None:
         """Read records of episodes, for a while."""
@@ -281,7 +308,12 @@ class RunView:
             begun=min((row.begun for row in rows if row.begun), default=tail.begun),
             samples=max((row.sample for row in rows), default=0),
             causes=self._causes(rows),
-            version=tail.version + (self._spending.spent.requests if self._spending.spent else 0),
+            tags=self.noted.notes.tags,
+            version=(
+                tail.version,
+                self._spending.spent.requests if self._spending.spent else 0,
+                self.noted.changed,
+            ),
         )
 
     def _is_played(self, silent: float) -> bool:

@@ -20,11 +20,15 @@ from benchmarks.monitor.directories import Directories, Directory, Kind
 from benchmarks.monitor.episode_view import MOST_TEXT
 from benchmarks.monitor.event_tail import EpisodeRow
 from benchmarks.monitor.fingerprint import fingerprint
+from benchmarks.monitor.forms import Forms
 from benchmarks.monitor.language import Translator, chosen_language
-from benchmarks.monitor.record_figures import FailureCounts
+from benchmarks.monitor.notes import MOST_TEXT as MOST_TEXT_OF_NOTE
+from benchmarks.monitor.page_tables import KINDS, saved_table
+from benchmarks.monitor.record_figures import FailureCounts, Means
 from benchmarks.monitor.run_view import RunSummary, run_views
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import Manifest, RunDirectory
+from er_gym.writing import file_stem
 
 Routes: TypeAlias = Mapping[str, Callable[..., Any]]
 """The function that answers at each address."""
@@ -36,6 +40,8 @@ AN_HOUR = {"Cache-Control": "private, max-age=3600"}
 READ_SECONDS = 0.1
 """How long records are read at a time, while a page waits; the rest follows while it is open."""
 _MOST_ASKED = 2000
+_MOST_FORM = 12 * MOST_TEXT_OF_NOTE + 4096
+"""A character of a form has at most 12 bytes."""
 
 
 class NotFound(Exception):
@@ -66,6 +72,7 @@ class Site:
     Attributes:
         directories: those that it shows.
         runs: what was read of those that are runs.
+        forms: reads the forms of pages that note something.
     """
 
     def __init__(self, directories: Directories) -> None:
@@ -78,15 +85,22 @@ class Site:
             trim_blocks=True,
             lstrip_blocks=True,
         )
+        self.forms = Forms(_MOST_FORM)
         self._templates.globals.update(
-            svg=svg, query=urlencode, most_text=MOST_TEXT, decided_on=decided_on
+            secret_of_notes=self.forms.secret,
+            most_note=MOST_TEXT_OF_NOTE,
+            svg=svg,
+            query=urlencode,
+            most_text=MOST_TEXT,
+            decided_on=decided_on,
         )
         self._templates.filters.update(formats.FILTERS)
 
     def show(
         self, request: Request, template: str, variables: Mapping[str, Any], status: int = 200
     ) -> Response:
-        """A page in the reader's language.
+        """A page in the reader's language; one of its tables as a file if the address asks for it
+        (:mod:`benchmarks.monitor.page_tables`).
 
         Args:
             request: asks for it.
@@ -98,7 +112,9 @@ class Site:
         here = request.url.path + (f"?{request.url.query}" if request.url.query else "")
         live = variables.get("live", "")
         told = {"state": self.state_of(live), **variables} if live else variables
-        return HTMLResponse(self.page(template, told, self.translator(request), here), status)
+        page = self.page(template, told, self.translator(request), here)
+        kind, name = (request.query_params.get(each, "") for each in ("as", "table"))
+        return _file(page, name, kind) if kind and status == 200 else HTMLResponse(page, status)
 
     def page(
         self,
@@ -168,6 +184,11 @@ class Site:
             view.read_records(READ_SECONDS)
             return view.failures
 
+    def means(self, directory: Directory) -> Means | None:
+        """The metrics of a run, over the records that have been read; None if none has."""
+        with self.runs.use(directory) as view:
+            return view.means()[0]
+
     def version(self, directory: Directory, closely: bool = False) -> object:
         """What changes whenever a directory does.
 
@@ -207,3 +228,19 @@ class Site:
         with or_nothing():
             run = RunDirectory.open(self.directory(id, "run").path)
             return run.episode(key), run.manifest
+
+
+def _file(page: str, name: str, kind: str) -> Response:
+    """A table of a page as a file."""
+    text = saved_table(page, name, kind) if kind in KINDS else None
+    if text is None:
+        raise NotFound
+    named = f'attachment; filename="{file_stem(name)}.{kind}"'
+    return Response(text, media_type=KINDS[kind], headers={"Content-Disposition": named})
+
+
+def is_here(address: str) -> bool:
+    """Whether an address is one of this server's: a path, and not of another host (``//host``)."""
+    return (
+        address.startswith("/") and not address.startswith(("//", "/\\")) and address.isprintable()
+    )

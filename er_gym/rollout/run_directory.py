@@ -50,6 +50,8 @@ REPLIES = "replies"
 _DATABASE = "cache.db"
 """The file of diskcache in the folder of replies."""
 SERVER_EVENTS = "server-events.jsonl"
+NOTES = "notes.json"
+"""What people note of the run, see :mod:`benchmarks.monitor.notes`."""
 
 
 class RunDirectoryError(FolderConflict):
@@ -141,7 +143,7 @@ RUN = FolderKind(
     command="er-gym bench",
     manifest=MANIFEST,
     model=Manifest,
-    parts=(EPISODES, CONVERSATIONS, PICTURES, SPENDING, SERVER_EVENTS, REPLIES, EVENTS),
+    parts=(EPISODES, CONVERSATIONS, PICTURES, SPENDING, SERVER_EVENTS, REPLIES, EVENTS, NOTES),
     holds_something=lambda path: has_content(path / EPISODES) or _has_replies(path),
     shared=True,
     compared=_compared,

@@ -13,6 +13,8 @@ from benchmarks.monitor.failures import FAILURES
 from benchmarks.monitor.listing import page_number, page_of
 from benchmarks.monitor.settings_view import settings_of
 from benchmarks.monitor.site import NotFound, Routes, Site, or_nothing
+from benchmarks.scoring.metrics import METRICS
+from benchmarks.scoring.scorers import CORRECTED
 from er_gym.rollout.run_directory import RunDirectory
 
 MOST_RUNS = 12
@@ -71,8 +73,12 @@ class ComparePages:
         flipped.sort(key=lambda pair: (CHANGES.index(pair.change), pair.key))
         settings = settings_of([summary for summary, _ in runs])
         counts = [self._site.failures(directory) for directory in directories]
+        means = [self._site.means(directory) for directory in directories]
         variables = {
             "runs": [summary for summary, _ in runs],
+            "means": means,
+            "metrics": METRICS if all(means) else (),
+            "scorer": CORRECTED.name,
             "failures": [
                 (kind, [counted.numbers[kind] for counted in counts])
                 for kind in FAILURES

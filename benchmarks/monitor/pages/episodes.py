@@ -60,7 +60,8 @@ class EpisodePages(ReplayPages):
             "filter": chosen,
             "before": before,
             "after": after,
-            "scripts": ("episode.js", "enlarge.js"),
+            "note": row.note if row else None,
+            "scripts": ("episode.js", "enlarge.js", "notes.js"),
         }
         return self._site.show(request, "episode.html", variables)
 

@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 
 from agents import AGENTS
 from agents.zoo.index import PREFIX, model_names
-from benchmarks.monitor.play.forms import BadForm, Forms
+from benchmarks.monitor.forms import BadForm, Forms
 from benchmarks.monitor.play.plan import plan, playable, run_path
 from benchmarks.monitor.play.session import Order, Refused, Session, SessionState
 from benchmarks.monitor.play.sessions import Sessions

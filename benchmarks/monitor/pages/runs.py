@@ -8,6 +8,7 @@ from typing import Any
 from fastapi import Request, Response
 
 from benchmarks.monitor.listing import page_of
+from benchmarks.monitor.run_list import RunFilter, choices
 from benchmarks.monitor.run_view import Filter, RunView
 from benchmarks.monitor.settings_view import settings_of
 from benchmarks.monitor.site import READ_SECONDS, Routes, Site
@@ -32,7 +33,7 @@ def _paper_rows() -> list[tuple[str, Mapping[str, float], float]]:
 def run_variables(view: RunView, chosen: Filter) -> dict[str, Any]:
     """What the page of a run says."""
     groups, types = view.success_counts()
-    choices = view.choices()
+    values = view.choices()
     summary, (means, means_by_group) = view.summary(), view.means()
     return {
         "run": summary,
@@ -42,13 +43,14 @@ def run_variables(view: RunView, chosen: Filter) -> dict[str, Any]:
         "groups": groups,
         "types": types,
         "samples": view.sample_counts(),
-        "choices": choices,
-        "unknown": chosen.unknown_type(choices["type"]),
+        "choices": values,
+        "unknown": chosen.unknown_type(values["type"]),
         "failures": view.failures,
         "means": means,
         "means_by_group": means_by_group,
         "read": (view.figures.done, sum(row.ended is not None for row in view.rows.values())),
         "scorer": CORRECTED.name,
+        "notes_problem": view.noted.problem,
         "paper": _paper_rows(),
     }
 
@@ -65,11 +67,19 @@ class RunPages:
 
     def home(self, request: Request) -> Response:
         """All runs."""
-        summaries = [
+        every = [
             self._site.summary(directory) for directory in self._site.directories.of_kind("run")
         ]
-        summaries.sort(key=lambda each: (each.state != "playing", each.directory.name))
-        variables = {"runs": summaries, "roots": self._site.directories.roots, "live": "*"}
+        chosen = RunFilter.of(request.query_params)
+        variables = {
+            "every": len(every),
+            "page": page_of(chosen.chosen(every), chosen.page),
+            "filter": chosen,
+            "choices": choices(every),
+            "roots": self._site.directories.roots,
+            "live": "*",
+            "at": "runs",
+        }
         return self._site.show(request, "home.html", variables)
 
     def run(self, request: Request, id: str) -> Response:
@@ -79,4 +89,6 @@ class RunPages:
         with self._site.runs.use(directory) as view:
             view.read_records(_FILTER_SECONDS if chosen.failure else READ_SECONDS)
             variables = run_variables(view, chosen)
-        return self._site.show(request, "run.html", {**variables, "live": id})
+        return self._site.show(
+            request, "run.html", {**variables, "live": id, "scripts": ("notes.js",)}
+        )

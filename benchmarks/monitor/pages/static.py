@@ -8,7 +8,7 @@ from fastapi import Request, Response
 from fastapi.responses import RedirectResponse
 
 from benchmarks.monitor.language import LANGUAGES
-from benchmarks.monitor.site import LANGUAGE, NotFound, Routes
+from benchmarks.monitor.site import LANGUAGE, NotFound, Routes, is_here
 
 _KINDS = {".css": "text/css; charset=utf-8", ".js": "text/javascript; charset=utf-8"}
 
@@ -41,13 +41,6 @@ class StaticPages:
         if name not in LANGUAGES:
             raise NotFound
         back = request.query_params.get("back", "/")
-        answer = RedirectResponse(back if _is_here(back) else "/", 303)
+        answer = RedirectResponse(back if is_here(back) else "/", 303)
         answer.set_cookie(LANGUAGE, name, max_age=10**8, httponly=True, samesite="lax")
         return answer
-
-
-def _is_here(address: str) -> bool:
-    """Whether an address is one of this server's: a path, and not of another host (``//host``)."""
-    return (
-        address.startswith("/") and not address.startswith(("//", "/\\")) and address.isprintable()
-    )

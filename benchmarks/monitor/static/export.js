@@ -27,6 +27,7 @@
     };
     const takes = (told) =>
       ["type", "scene", "outcome", "failure", "reason"].every((name) => !query.get(name) || query.get(name) === told[name]) &&
+      (!query.get("note") || told.note === query.get("note") || (query.get("note") === "note" && told.note)) &&
       within(told.steps, query.get("steps") || "") &&
       (!query.get("text") || told.text.includes(query.get("text").toLowerCase()));
     const show = () => {

@@ -29,11 +29,15 @@ class BadForm(Exception):
 class Forms:
     """Reads the forms of this process's pages.
 
+    Args:
+        most_bytes: of a form.
+
     Attributes:
         secret: is in every form of a page. No page of another origin can read it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most_bytes: int = _MOST_BYTES) -> None:
+        self._most_bytes = most_bytes
         self.secret = secrets.token_urlsafe(24)
 
     async def read(self, request: Request) -> Mapping[str, str]:
@@ -50,7 +54,7 @@ class Forms:
         body = b""
         async for chunk in request.stream():
             body += chunk
-            if len(body) > _MOST_BYTES:
+            if len(body) > self._most_bytes:
                 raise BadForm("the form is too long", 413)
         try:
             pairs = parse_qsl(body.decode(), True, errors="strict", max_num_fields=_MOST_FIELDS)
