@@ -64,7 +64,7 @@ def test_a_note_is_kept_beside_the_run_shown_filtered_saved_and_exported(folder,
     assert "<script>alert" not in out.read_text()
 
     form |= {"flag": "", "text": " "}
-    client.post(f"{address}/note", data=form, headers=here)
+    client.post(f"{address}/note", data=form, headers={"origin": HERE})
     assert list(read_notes(folder).episodes) == [second]
 
 

@@ -13,7 +13,8 @@ from benchmarks.monitor.notes import tag_run
 from benchmarks.monitor.page_tables import saved_table
 
 PAGE = """<table data-table="other"><tr><td>x</td></tr></table>
-<table data-table="t"><thead><tr><th></th><th><a href="?">Name ▾</a></th><th>n</th><th>Rate</th></tr>
+<table data-table="t"><thead><tr><th></th><th><a href="?">Name ▾</a></th><th>n</th>
+<th>Rate</th></tr>
 </thead><tbody><tr data-row="a&amp;b"><td><input></td><td>=1+1</td><td class="number">−1,234</td>
 <td><span data-value="0.5" data-low="0.25">50 %</span></td></tr>
 <tr data-row="c"><td></td><td>a<br>b, &quot;c&quot;</td><td>–</td><td>–</td></tr></tbody></table>"""
