@@ -124,6 +124,20 @@ def view_of(run: RunDirectory, key: str) -> EpisodeView:
     )
 
 
+def view_so_far(record: EpisodeRecord) -> EpisodeView:
+    """An episode that is under way, without the conversation, which is written at its end."""
+    return EpisodeView(
+        record=record,
+        steps=tuple(_steps(record, None, [])),
+        pictures=(),
+        failure=None,
+        success=False,
+        tokens=0,
+        cost=0.0,
+        problem="",
+    )
+
+
 def picture_file(run: Path, picture: PictureRecord) -> Path | None:
     """The file of a picture; None unless it is a regular file in the run's folder of pictures."""
     return file_inside(run, PICTURES, picture.path)

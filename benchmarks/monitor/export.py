@@ -199,7 +199,7 @@ class _Maker:
     def list_page(self) -> OfflinePage:
         """The run's page with all rows."""
         with self._site.runs.use(self.directory) as view:
-            variables = run_variables(view, Filter())
+            variables = run_variables(view, Filter(), self._words)
             every = view.chosen(Filter())
             variables["page"] = Page(every, len(every), 1, 1)
 

@@ -21,13 +21,20 @@ from benchmarks.monitor.record_figures import (
     RecordFigures,
 )
 from benchmarks.monitor.record_rows import RecordRows
+from benchmarks.monitor.server_tail import ServerTail
 from benchmarks.monitor.spending_tail import SpendingTail
 from benchmarks.scoring.metrics import success_rate
 from benchmarks.scoring.samples import TaskSamples, group_by, most_samples, task_samples
 from er_gym.locking import LOCK
 from er_gym.rollout.causes import count_causes
 from er_gym.rollout.events import EVENTS, Cost
-from er_gym.rollout.run_directory import SPENDING, Manifest, RunDirectory, RunDirectoryError
+from er_gym.rollout.run_directory import (
+    SERVER_EVENTS,
+    SPENDING,
+    Manifest,
+    RunDirectory,
+    RunDirectoryError,
+)
 from er_gym.tasks.types import task_type
 
 FLAG = "flag"
@@ -199,13 +206,15 @@ class RunView:
         directory: where it is.
         figures: what its records tell.
         noted: what people noted of it.
+        spending, server: what its replies cost, and what its model server did.
     """
 
     directory: Directory
     figures: RecordFigures = field(default_factory=RecordFigures)
     _tail: EventTail = field(init=False)
     _records: RecordRows = field(init=False)
-    _spending: SpendingTail = field(init=False)
+    spending: SpendingTail = field(init=False)
+    server: ServerTail = field(init=False)
     noted: NotesTail = field(init=False)
     _rows: Mapping[str, EpisodeRow] = field(default_factory=dict)
     _manifest: Manifest | None = None
@@ -215,7 +224,8 @@ class RunView:
     def __post_init__(self) -> None:
         self._tail = EventTail(self.directory.path / EVENTS)
         self._records = RecordRows(self.directory.path)
-        self._spending = SpendingTail(self.directory.path / SPENDING)
+        self.spending = SpendingTail(self.directory.path / SPENDING)
+        self.server = ServerTail(self.directory.path / SERVER_EVENTS)
         self.noted = NotesTail(self.directory.path)
 
     def read(self) -> None:
@@ -227,7 +237,8 @@ class RunView:
             except (RunDirectoryError, OSError) as error:
                 self._problem = str(error)
         self._tail.read()
-        self._spending.read()
+        self.spending.read()
+        self.server.read()
         self._rows = self._records.agreeing(self._tail.rows)
         self._tell_notes()
 
@@ -302,7 +313,7 @@ class RunView:
             finished=finished,
             counts=counts,
             success=SuccessCount.of("", rows),
-            spent=self._spending.spent or _of_replies(rows),
+            spent=self.spending.spent or _of_replies(rows),
             decisions_per_second=_speed(rows, tail.time),
             seconds_left=left,
             begun=min((row.begun for row in rows if row.begun), default=tail.begun),
@@ -311,7 +322,8 @@ class RunView:
             tags=self.noted.notes.tags,
             version=(
                 tail.version,
-                self._spending.spent.requests if self._spending.spent else 0,
+                self.spending.spent.requests if self.spending.spent else 0,
+                self.server.counts.total(),
                 self.noted.changed,
             ),
         )

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from datetime import datetime
 
 from pydantic import ValidationError
 
 from agents.vlm.clients.budget import Entry
+from benchmarks.monitor.curve_tail import Thinned
 from benchmarks.monitor.line_tail import LineFollower, Lines
 from er_gym.rollout.events import Cost
 
@@ -20,11 +22,16 @@ class SpendingTail(LineFollower):
 
     Attributes:
         spent: so far; None without a ledger.
+        over: by ``cost``, ``tokens`` and ``requests``, how much was spent until a time, in seconds
+            since the epoch.
+        rejected: how many answers were paid for that were no valid replies.
     """
 
     longest = 2**20
 
     spent: Cost | None = None
+    over: dict[str, Thinned] = field(default_factory=dict)
+    rejected: int = 0
 
     def _take(self, lines: Lines) -> None:
         spent = self.spent or Cost(requests=0, tokens=0, cost=0.0)
@@ -34,6 +41,7 @@ class SpendingTail(LineFollower):
             spent.cost,
             spent.estimated,
         )
+        told: list[tuple[float | None, float, int, int]] = []
         for line in lines.lines:
             try:
                 entry = Entry.model_validate_json(line)
@@ -43,4 +51,19 @@ class SpendingTail(LineFollower):
             tokens += entry.prompt + entry.completion
             cost += entry.cost
             estimated = estimated or entry.estimated
+            self.rejected += bool(entry.rejected)
+            told.append((seconds_of(entry.time), cost, tokens, requests))
+        timed = [each for each in told if each[0] is not None]
+        if timed:
+            times, *sums = zip(*timed, strict=True)
+            for name, values in zip(("cost", "tokens", "requests"), sums, strict=True):
+                self.over.setdefault(name, Thinned()).add(times, values)
         self.spent = Cost(requests=requests, tokens=tokens, cost=cost, estimated=estimated)
+
+
+def seconds_of(time: str) -> float | None:
+    """A time in ISO 8601 as seconds since the epoch; None if it is none."""
+    try:
+        return datetime.fromisoformat(time).timestamp()
+    except (ValueError, OverflowError, OSError):
+        return None

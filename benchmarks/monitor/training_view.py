@@ -24,6 +24,8 @@ _FRESH_SECONDS = 120.0
 """A log that grew so lately is taken to be growing, whoever writes it."""
 _MOST_KEPT = 32
 """The curves of no more runs are kept."""
+CURVED = ("policy", "finetuning", "reinforcement")
+"""The kinds of directories that have curves."""
 _OVER = {"policy": "steps", "finetuning": "update", "reinforcement": "update"}
 _LOG = {
     "policy": "curve.jsonl",
@@ -231,6 +233,11 @@ def reinforcement_charts(tail: CurveTail, t: Translator) -> list[tuple[str, Any]
     drawn = [(t(name), as_svg(name, Chart(t(name), updates, y, lines)))
              for name, y, lines in wanted]  # fmt: skip
     return [(title, picture) for title, picture in drawn if picture]
+
+
+def over_of(directory: Directory) -> str:
+    """The key of the words for what a training's curves are drawn over."""
+    return "environment_steps" if directory.kind == "policy" else "updates"
 
 
 def curves() -> Followed[CurveTail]:

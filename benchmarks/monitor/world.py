@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -28,6 +28,10 @@ from er_gym.thor import make_controller
 GRID = 0.25
 """The side of a square of floor, metres."""
 _MOST_KEPT = 16
+
+
+DRAWN: Mapping[str, str] = {"rgb": "text", "depth": "depth", "instance": "instance"}
+"""What can be drawn of a moment, and the observation of the environment that draws it."""
 
 
 class CannotReplay(ValueError):
@@ -120,20 +124,27 @@ class Worlds:
                 self._kept.popitem(last=False)
             return found
 
-    def frame(self, manifest: Manifest, record: EpisodeRecord, number: int) -> NDArray[np.uint8]:
+    def frame(
+        self, manifest: Manifest, record: EpisodeRecord, number: int, what: str = "rgb"
+    ) -> NDArray[np.uint8]:
         """(height, width, 3) uint8: what the agent could see after a step.
+
+        Args:
+            manifest, record: of the episode.
+            number: of the step.
+            what: one of :data:`DRAWN`.
 
         Raises:
             CannotReplay: as above, or there is no such step.
         """
         with self._lock:
             task = task_of(manifest, record)
-            env = self._environment(manifest)
-            env.reset(seed=record.seed, options={"task": task})
+            env = self._environment(manifest, DRAWN[what])
+            obs, _ = env.reset(seed=record.seed, options={"task": task})
             for step in record.steps[1 : number + 1]:
                 if not step.appended:
-                    env.step(action_in(step.verb, step.object_type))
-            picture = env.render()
+                    obs, *_ = env.step(action_in(step.verb, step.object_type))
+            picture = _SHOWN[what](obs[what]) if what in _SHOWN else env.render()
             if not isinstance(picture, np.ndarray):
                 raise CannotReplay("nothing is drawn")
             return picture
@@ -161,23 +172,24 @@ class Worlds:
                     raise CannotReplay("nothing is drawn")
                 yield np.asarray(picture)
 
-    def _environment(self, manifest: Manifest) -> EmbodiedEnv:
-        if self._env is None or self._env[0] != manifest.digest:
+    def _environment(self, manifest: Manifest, obs_mode: str = "text") -> EmbodiedEnv:
+        wanted = f"{manifest.digest} {obs_mode}"
+        if self._env is None or self._env[0] != wanted:
             if self._env is not None:
                 self._env[1].close()
-            self._env = manifest.digest, environment_of(manifest)
+            self._env = wanted, environment_of(manifest, obs_mode)
         return self._env[1]
 
 
-def environment_of(manifest: Manifest) -> EmbodiedEnv:
-    """An environment like that of a run, with texts as observations; it renders pictures.
+def environment_of(manifest: Manifest, obs_mode: str = "text") -> EmbodiedEnv:
+    """An environment like that of a run, with other observations; it renders pictures.
 
     Raises:
         CannotReplay: the run was not played on the embedded engine.
     """
     if manifest.env.get("backend", "embedded") != "embedded":
         raise CannotReplay("it was played on another backend, which does not repeat itself")
-    given = {**manifest.env, "obs_mode": "text", "render_mode": "rgb_array"}
+    given = {**manifest.env, "obs_mode": obs_mode, "render_mode": "rgb_array"}
     try:
         return EmbodiedEnv((), **given)
     except (TypeError, ValueError) as error:
@@ -190,15 +202,24 @@ def task_of(manifest: Manifest, record: EpisodeRecord) -> Task:
     Raises:
         CannotReplay: it is not at hand.
     """
+    return task_at(manifest, record.task_id)
+
+
+def task_at(manifest: Manifest, task_id: str) -> Task:
+    """A task of a run's suite.
+
+    Raises:
+        CannotReplay: it is not at hand.
+    """
     # Only er-gym's own suites: another name could be a module, which would be run.
     if manifest.suite not in suite_names():
         raise CannotReplay(f"{manifest.suite} is none of er-gym's own suites")
     digest, tasks = _tasks(manifest.suite)
     if digest != manifest.suite_digest:
         raise CannotReplay(f"the suite {manifest.suite} has changed since")
-    if record.task_id not in tasks:
-        raise CannotReplay(f"{manifest.suite} has no task {record.task_id}")
-    return tasks[record.task_id]
+    if task_id not in tasks:
+        raise CannotReplay(f"{manifest.suite} has no task {task_id}")
+    return tasks[task_id]
 
 
 @lru_cache(maxsize=2)
@@ -286,3 +307,30 @@ def _footprint(told: tuple[Mapping[str, Any], str]) -> Footprint:
         holds=bool(one["receptacle"] and not one["pickupable"]) and one["objectType"] != "Floor",
         inside=inside,
     )
+
+
+def depth_picture(depth: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """(height, width, 3) uint8: depths in metres as grey, the nearest surface white and the
+    farthest nearly black."""
+    near, far = float(depth.min()), float(depth.max())
+    grey = 255.0 - 235.0 * (depth - near) / max(far - near, 1e-6)
+    return np.repeat(grey.astype(np.uint8)[:, :, None], 3, axis=2)
+
+
+def instance_picture(ids: NDArray[np.int32]) -> NDArray[np.uint8]:
+    """(height, width, 3) uint8: a colour for each object, dark grey for the room."""
+    numbers = np.arange(int(ids.max()) + 1)
+    # Hues a golden angle apart, so that neighbours in the list of objects look different.
+    hues = numbers[:, None] * 0.618034 + np.array([0.0, 2 / 3, 1 / 3])
+    wheel = np.clip(np.abs((hues % 1.0) * 6 - 3) - 1, 0, 1)
+    bright = (0.55 + 0.15 * (numbers % 4))[:, None]
+    palette = (255 * bright * (0.25 + 0.75 * wheel)).astype(np.uint8)
+    palette[0] = 40
+    return palette[ids]
+
+
+_SHOWN: Mapping[str, Callable[[Any], NDArray[np.uint8]]] = {
+    "depth": depth_picture,
+    "instance": instance_picture,
+}
+"""How an observation that is no picture is shown as one."""

@@ -180,8 +180,10 @@ def test_a_link_of_another_site_with_the_token_opens_the_page(browser, serve, tm
     context.close()
 
 
-def test_filter_slider_keys_and_comparison(page, serve, runs):
-    page.goto(serve(runs).address)
+def test_filter_slider_keys_and_comparison(page, serve, runs, tmp_path):
+    for name in ("oracle", "random"):
+        shutil.copytree(runs / name, tmp_path / name)
+    page.goto(serve(tmp_path).address)
     page.click("a:has-text('/random')")
     page.select_option("select[name=outcome]", "failure")
     page.fill("input[name=steps]", "2-")
@@ -198,15 +200,25 @@ def test_filter_slider_keys_and_comparison(page, serve, runs):
     page.locator("[data-slider]").fill("1")
     assert page.url.endswith("#step-1")
     page.wait_for_selector("svg.room .stand.now")
+    page.select_option("[data-speed]", "8")
+    page.click("[data-play]")
+    page.wait_for_function(
+        "last => document.querySelector('li.now').dataset.step === last", arg=str(last)
+    )
+    page.wait_for_selector("[data-play][aria-pressed=false]")
     page.click("[data-draw]")
     page.wait_for_function("() => document.querySelector('[data-frame]').naturalWidth > 0")
+    page.click(".noting summary")
+    page.fill("textarea[name=text]", "odd")
+    page.click(".noting button")
+    page.wait_for_selector("text=Saved.")
     address = page.url
     page.keyboard.press("j")
     page.wait_for_function(
         "address => location.href.split('#')[0] !== address.split('#')[0]", arg=address
     )
 
-    page.goto(page.url.split("/runs/")[0] + "/compare")
+    page.goto(page.url.split("/runs/")[0] + "/")
     for box in page.locator("input[name=of]").all():
         box.check()
     page.click("button:has-text('Compare')")
@@ -236,7 +248,12 @@ def test_a_person_plays_a_whole_task_to_success(page, serve, runs, tmp_path):
         assert page.locator("figure img").first.evaluate(
             "image => image.decode().then(() => image.naturalWidth)"
         )
-        if step.verb == "end":
+        if number == 1:
+            page.keyboard.press("/")
+            page.keyboard.type(action.lower())
+            page.keyboard.press("Enter")
+        elif step.verb == "end":
+            page.keyboard.press("Escape")
             page.keyboard.press("e")
             page.keyboard.press("Enter")
         else:
@@ -357,12 +374,15 @@ def test_pages_of_all_kinds_can_be_used_without_eyes_or_mouse(browser, serve, ru
         f"/compare/episode?of={ids['random']}&of={ids['oracle']}&key={episode}",
         f"/data/{ids['collection']}", f"/data/{ids['collection']}/trajectory?key={turns}",
         f"/training/{ids['finetuning']}", f"/training/{ids['policy']}",
+        f"/training/curves?of={ids['finetuning']}&of={ids['policy']}",
     ]  # fmt: skip
     wrong = []
     context = browser.new_context(bypass_csp=True, reduced_motion="reduce")
     page = context.new_page()
     for place in pages:
         page.goto(address + place)
+        if "curves" in place:
+            page.wait_for_selector("#curves canvas >> nth=1")
         page.evaluate(source)
         for width, scheme in ((1440, "light"), (900, "dark"), (360, "light")):
             page.set_viewport_size({"width": width, "height": 900})

@@ -8,13 +8,16 @@ import re
 import shutil
 import threading
 from collections import Counter
+from io import BytesIO
 from pathlib import Path
 from typing import get_args
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from episodes_by_hand import make_step
 from fastapi.testclient import TestClient
+from PIL import Image
 
 from agents.vlm.chat import Usage
 from agents.vlm.clients.budget import Budget, Entry, Ledger
@@ -27,7 +30,7 @@ from benchmarks.monitor.run_view import Filter
 from benchmarks.monitor.site import Site
 from benchmarks.scoring.metrics import score_episode, summarise
 from benchmarks.scoring.scorers import CORRECTED
-from er_gym.rollout.run_directory import SPENDING, RunDirectory
+from er_gym.rollout.run_directory import SERVER_EVENTS, SPENDING, RunDirectory
 from er_gym.tasks.types import canonical_names
 from er_gym.writing import file_stem
 from tests.support import in_one_test
@@ -98,6 +101,13 @@ def test_a_run_costs_what_its_ledger_says_with_the_answers_that_were_rejected(
 
     pay(Usage(1_100, 7), "")
     pay(Usage(2_000, 100), "no choices")
+    (folder / SERVER_EVENTS).write_text(
+        '{"time":"2026-01-01T00:00:00+00:00","event":"retry","what":"<b>503</b>","wait":90}\n{"ti'
+    )
+    server = client.get(address).text.partition('id="server"')[2].partition("</section>")[0]
+    assert "answers paid for 2, not valid 1 · retries 1 · waited (s) 0:01:30" in said(server)
+    assert "&lt;b&gt;503" in server
+    assert server.count('<svg class="chart"') == 3  # dollars, tokens, retries
     for path in ("/", address):
         text = said(client.get(path).text)
         assert "3,207" in text, path
@@ -248,7 +258,7 @@ def test_an_episode_without_a_record_says_why(runs, visit, tmp_path):
     (id,) = (one.id for one in Directories([tmp_path]).all())
     for task, expected in (
         (damaged, "The record of this episode cannot be read: "),
-        (under_way, "This episode is being played. It can be opened when it is over."),
+        (under_way, "This episode is being played, and this page follows it."),
     ):
         answer = client.get(f"/runs/{id}/episode", params={"key": task})
         assert answer.status_code == 200
@@ -265,6 +275,14 @@ def test_the_room_from_above_is_drawn_by_playing_again(client, ids, runs):
     last = len(episode.steps) - 1
     frame = client.get(f"/runs/{ids['oracle']}/frame", params={"key": episode.key, "n": last})
     assert (frame.status_code, frame.content[:3]) == (200, b"\xff\xd8\xff")
+    address = f"/runs/{ids['oracle']}/frame?key={episode.key}&n={last}&what="
+    seen = {
+        what: np.asarray(Image.open(BytesIO(client.get(address + what).content)).convert("RGB"))
+        for what in ("depth", "instance")
+    }
+    assert np.ptp(seen["depth"].astype(int), axis=2).max() < 8  # grey
+    assert np.ptp(seen["instance"].astype(int), axis=2).max() > 80
+    assert client.get(address + "classes").status_code == 404
     beyond = client.get(f"/runs/{ids['oracle']}/frame", params={"key": episode.key, "n": last + 1})
     assert beyond.status_code == 404
 

@@ -372,6 +372,24 @@ def test_where_playing_is_off_nothing_is_written(tmp_path: Path) -> None:
     assert not any(tmp_path.iterdir())
 
 
+def test_an_action_is_typed_and_a_task_is_skipped(tmp_path: Path) -> None:
+    with Player(tmp_path / "played") as player:
+        session = player.begin(task="", type=TYPE)
+        went = next(one for one in player.offered(session) if one.startswith("navigate to "))
+        for text in ("", "navigate to", "fly to the moon"):
+            assert player.act(session, text).status_code == 422, text
+        assert (
+            player.act(session, went.replace("navigate to ", "GO  to ").lower()).status_code == 303
+        )
+        assert f"<b>{went}</b>" in player.get(session)
+        assert player.post(session, do="skip").status_code == 303
+        page = player.get(session)
+        assert 'name="step" value="1"' in page  # the next task has begun
+        (record,) = player.run().episodes()
+        assert (record.end_reason, record.gave_up) == ("gave up", "the person skipped it")
+        assert len(record.steps) == 2
+
+
 def test_sessions_are_few_and_end_when_the_person_has_left(tmp_path: Path) -> None:
     sessions = Sessions(most=1, idle_seconds=0.5)
     first = sessions.begin(plan(tmp_path, suite="mini", task=FIRST.id))

@@ -78,6 +78,31 @@ def test_a_policy_shows_training_and_evaluation(tmp_path, visit):
     assert "single_search 25.0 %" in said(text)
 
 
+def test_curves_of_several_runs_are_laid_over_one_another(tmp_path, visit):
+    folders = [make_policy(tmp_path / name) for name in ("one", "two", "other")]
+    for seed, folder in enumerate(folders):
+        config = (folder / "config.yaml").read_text()
+        other = config.replace("4000", "9000") if folder.name == "other" else config
+        (folder / "config.yaml").write_text(f"seed: {seed}\n{other}")
+    client = visit(tmp_path)
+    ids = {each.path.name: each.id for each in Directories([tmp_path]).all()}
+    listed = client.get("/training").text
+    assert all(f'name="of" value="{id}"' in listed for id in ids.values())
+    asked = "&".join(f"of={ids[name]}" for name in ("one", "two", "other")) + "&of=000000000000"
+    page = client.get(f"/training/curves?{asked}").text
+    assert "/static/uPlot.iife.min.js" in page
+    address = re.search(r'data-points="([^"]+)"', page)[1].replace("&amp;", "&")
+    told = client.get(address).json()["runs"]
+    assert [run["id"] for run in told] == [ids[name] for name in ("one", "two", "other")]
+    assert told[0]["series"]["rollout/success_rate"] == [[1000.0], [0.25]]
+    assert "steps" not in told[0]["series"]
+    assert told[0]["group"] == told[1]["group"] != told[2]["group"]
+    assert client.get("/training/curves").status_code == 200
+    assert client.get("/static/uPlot.iife.min.js").text.startswith(
+        "/*! https://github.com/leeoniya"
+    )
+
+
 def test_a_reinforcement_shows_success_and_each_reward(tmp_path, visit):
     folder = tmp_path / "learning"
     folder.mkdir()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from pathlib import Path
 from urllib.parse import urlencode
@@ -9,12 +10,13 @@ from urllib.parse import urlencode
 from fastapi import Request, Response
 
 from benchmarks.monitor.directories import Directory
-from benchmarks.monitor.episode_view import picture_file, view_of
+from benchmarks.monitor.episode_view import picture_file, view_of, view_so_far
 from benchmarks.monitor.event_tail import EpisodeRow
 from benchmarks.monitor.listing import neighbours
 from benchmarks.monitor.pages.replays import ReplayPages
 from benchmarks.monitor.run_view import Filter
 from benchmarks.monitor.site import NotFound, Routes, Site, or_nothing
+from benchmarks.monitor.under_way import record_so_far
 from benchmarks.monitor.video import as_webp, film
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import Manifest, RunDirectory
@@ -93,7 +95,14 @@ class EpisodePages(ReplayPages):
         self, request: Request, directory: Directory, row: EpisodeRow, chosen: Filter, why: str
     ) -> Response:
         """An episode without a record: it is under way, or its record is damaged."""
+        episode = None
+        if row.ended is None:
+            with contextlib.suppress(ValueError, OSError):
+                run = RunDirectory.open(directory.path)
+                episode = view_so_far(record_so_far(run.path, run.manifest, row))
         variables = {
+            "episode": episode,
+            "scripts": ("episode.js", "enlarge.js"),
             "directory": directory,
             "row": row,
             "filter": chosen,
@@ -103,7 +112,16 @@ class EpisodePages(ReplayPages):
         return self._site.show(request, "episode_under_way.html", variables)
 
     def _played(self, id: str, key: str) -> tuple[Manifest, EpisodeRecord]:
-        record, manifest = self._site.record(id, key)
+        try:
+            record, manifest = self._site.record(id, key)
+        except NotFound:
+            directory = self._site.directory(id, "run")
+            row = self._site.rows(directory).get(key)
+            if row is None or row.ended is not None:
+                raise
+            with or_nothing():
+                manifest = RunDirectory.open(directory.path).manifest
+            record = record_so_far(directory.path, manifest, row)
         return manifest, record
 
     def _picture(self, id: str, key: str, n: int) -> Path | None:

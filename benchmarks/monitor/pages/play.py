@@ -14,6 +14,7 @@ from starlette.concurrency import run_in_threadpool
 from agents import AGENTS
 from agents.zoo.index import PREFIX, model_names
 from benchmarks.monitor.forms import BadForm, Forms
+from benchmarks.monitor.language import Translator
 from benchmarks.monitor.play.plan import plan, playable, run_path
 from benchmarks.monitor.play.session import Order, Refused, Session, SessionState
 from benchmarks.monitor.play.sessions import Sessions
@@ -186,6 +187,7 @@ class PlayPages:
             "now": now,
             "turn": now.turn,
             "keys": KEYS,
+            "words": verb_words(self._site.translator(request)),
             "problem": problem,
             "secret": self._forms.secret,
             "directory": self._site.directories.at(run, "run"),
@@ -203,7 +205,7 @@ class PlayPages:
 
     def _change(self, request: Request, session: Session, form: Mapping[str, str]) -> Response:
         try:
-            before = _asked(session, form)
+            before = _asked(session, form, verb_words(self._site.translator(request)))
         except Refused as refused:
             problem = self._site.translator(request)(refused.key, **refused.values)
             return self._page(request, session, session.now, problem, refused.status)
@@ -237,8 +239,19 @@ def _run_in(path: Path) -> RunDirectory | None:
         return None
 
 
-def _asked(session: Session, form: Mapping[str, str]) -> SessionState:
+def verb_words(t: Translator) -> dict[str, str]:
+    """What the pages call each verb."""
+    named = {verb.name: f"do_{verb.name.replace(' ', '_')}" for verb in verbs.table()}
+    return {verb: t.name(key) if t.name(key) != key else verb for verb, key in named.items()}
+
+
+def _asked(session: Session, form: Mapping[str, str], words: Mapping[str, str]) -> SessionState:
     """Do what a form asks for; returns the state before.
+
+    Args:
+        session: of the person.
+        form: the fields.
+        words: what the page calls each verb.
 
     Raises:
         Refused: it cannot be done.
@@ -246,7 +259,8 @@ def _asked(session: Session, form: Mapping[str, str]) -> SessionState:
     wanted = form.get("do", "")
     if wanted == "act":
         text, number = form.get("action", ""), form.get("step", "")
-        action = parse(text)
+        turn = session.now.turn
+        action = (turn.named(text, words) if turn else None) or parse(text)
         if action is None or not (number.isascii() and number.isdigit() and len(number) < 7):
             raise Refused("play_illegal", 422, action=text[:80])
         return session.decide(action, int(number))

@@ -14,7 +14,7 @@ from benchmarks.monitor import formats
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.room_map import room_map
 from benchmarks.monitor.site import AN_HOUR, NotFound, Routes, Site, or_nothing
-from benchmarks.monitor.world import CannotReplay, Worlds
+from benchmarks.monitor.world import DRAWN, CannotReplay, Worlds
 from er_gym.data.pictures import encode_picture
 from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import Manifest
@@ -83,13 +83,15 @@ class ReplayPages(ABC):
             drawn = no_room(error, words)
         return HTMLResponse(drawn)
 
-    def frame(self, id: str, key: str = "", n: int = 0) -> Response:
-        """What the agent could see after a step, drawn now."""
+    def frame(self, id: str, key: str = "", n: int = 0, what: str = "rgb") -> Response:
+        """What the agent could see after a step, drawn now: in colours, as depth or by object."""
+        if what not in DRAWN:
+            raise NotFound
         with or_nothing():
             manifest, record = self._played(id, key)
             if not 0 <= n < len(record.steps):
                 raise NotFound
-            picture = self._worlds.frame(manifest, record, n)
+            picture = self._worlds.frame(manifest, record, n, what)
         return Response(encode_picture(picture), media_type="image/jpeg", headers=AN_HOUR)
 
 

@@ -7,9 +7,11 @@ from typing import Any
 
 from fastapi import Request, Response
 
+from benchmarks.monitor.language import Translator
 from benchmarks.monitor.listing import page_of
 from benchmarks.monitor.run_list import RunFilter, choices
 from benchmarks.monitor.run_view import Filter, RunView
+from benchmarks.monitor.server_view import server_view
 from benchmarks.monitor.settings_view import settings_of
 from benchmarks.monitor.site import READ_SECONDS, Routes, Site
 from benchmarks.scoring.scorers import CORRECTED
@@ -30,7 +32,7 @@ def _paper_rows() -> list[tuple[str, Mapping[str, float], float]]:
     ]
 
 
-def run_variables(view: RunView, chosen: Filter) -> dict[str, Any]:
+def run_variables(view: RunView, chosen: Filter, t: Translator) -> dict[str, Any]:
     """What the page of a run says."""
     groups, types = view.success_counts()
     values = view.choices()
@@ -50,6 +52,7 @@ def run_variables(view: RunView, chosen: Filter) -> dict[str, Any]:
         "means_by_group": means_by_group,
         "read": (view.figures.done, sum(row.ended is not None for row in view.rows.values())),
         "scorer": CORRECTED.name,
+        "server": server_view(view.spending, view.server, t),
         "notes_problem": view.noted.problem,
         "paper": _paper_rows(),
     }
@@ -88,7 +91,7 @@ class RunPages:
         chosen = Filter.of(request.query_params)
         with self._site.runs.use(directory) as view:
             view.read_records(_FILTER_SECONDS if chosen.failure else READ_SECONDS)
-            variables = run_variables(view, chosen)
+            variables = run_variables(view, chosen, self._site.translator(request))
         return self._site.show(
             request, "run.html", {**variables, "live": id, "scripts": ("notes.js",)}
         )

@@ -8,6 +8,7 @@ from typing import Any
 from fastapi import Request, Response
 
 from benchmarks.monitor.directories import Directory
+from benchmarks.monitor.pages.curves import CurvePages
 from benchmarks.monitor.run_view import RunSummary, SuccessCount
 from benchmarks.monitor.site import NotFound, Routes, Site
 from benchmarks.monitor.training_view import (
@@ -37,7 +38,8 @@ class TrainingPages:
 
     def routes(self) -> Routes:
         """The pages by address."""
-        return {"/training": self.all, "/training/{id}": self.one}
+        laid_over = CurvePages(self._site, self._curves)
+        return {"/training": self.all, **laid_over.routes(), "/training/{id}": self.one}
 
     def all(self, request: Request) -> Response:
         """All that trains."""

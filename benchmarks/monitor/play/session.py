@@ -22,6 +22,7 @@ from er_gym.rollout.agent import (
     Agent,
     Attachments,
     CanBeOverruled,
+    CannotFinish,
     CannotGoOn,
     Decision,
     LeavesAttachments,
@@ -36,11 +37,12 @@ from er_gym.tasks.task import Task
 Phase: TypeAlias = Literal["starting", "deciding", "acting", "over", "closed"]
 """``deciding``: it waits for the person; ``acting``: the agent thinks, or the environment works;
 ``over``: the episode has ended; ``closed``: the session has."""
-Order: TypeAlias = Literal["step", "go", "next"]
+Order: TypeAlias = Literal["step", "go", "next", "skip"]
 """What the person may ask for, besides an action: that the agent takes a step, that it goes on by
-itself, and that the next task begins."""
+itself, that the next task begins, and that this one is given up for the next."""
 _LONGEST_TEXT = 20_000
 _LEFT = "the person left"
+_SKIPPED = "the person skipped it"
 
 
 class Refused(Exception):
@@ -129,7 +131,7 @@ class Session:
         self._changed = threading.Condition()
         self._now = SessionState(wanted=len(plan.tasks))
         self._order: Order | Action | None = None
-        self._leaving = False
+        self._leaving = self._skips = False
         self._thread = threading.Thread(target=self._play, daemon=True)
         self._thread.start()
 
@@ -190,7 +192,7 @@ class Session:
             Refused: it makes no sense now.
         """
         with self._changed:
-            if order != "next" and not self.plan.agent:
+            if order in ("step", "go") and not self.plan.agent:
                 raise Refused("play_nobody")
             self._expect("over" if order == "next" else "deciding")
             return self._give(order)
@@ -278,6 +280,10 @@ class Session:
             crashed = bool(event.error)
             done = self._now.done + (not crashed)
             self._become(phase="over", going=False, ended=event, done=done)
+            if self._skips:
+                self._skips = False
+                with self._changed:
+                    self._order = "next" if done < self._now.wanted else None
 
     def _wait_for_end(self) -> None:
         """Wait until the last episode is written and the person asks for the next."""
@@ -309,6 +315,7 @@ class Session:
 
         Raises:
             CannotGoOn: the person has left.
+            CannotFinish: the person skips this task.
         """
         turn = turn_of(task, obs, info, self.plan.pictures)
         with self._changed:
@@ -325,6 +332,9 @@ class Session:
             return None
         order = self._wait_for_order()
         self._become(phase="acting", going=order == "go")
+        if order == "skip":
+            self._skips = True
+            raise CannotFinish(_SKIPPED)
         return order if isinstance(order, Action) else None
 
     def decided(self, decision: Decision, said: str) -> None:

@@ -45,6 +45,34 @@ class Turn:
         """How many steps are left."""
         return self.max_steps - self.number
 
+    def named(self, text: str, words: Mapping[str, str]) -> Action | None:
+        """The legal action that a person types: whole, or as much of it as means no other one.
+
+        Args:
+            text: such as ``open fridge`` or ``go to apple``, whatever the case.
+            words: what the page calls each verb.
+
+        Returns:
+            None if no legal action, or more than one, is meant.
+        """
+        wanted = " ".join(text.casefold().split())
+        names = {
+            action: [
+                f"{verb} {action.object_type}".strip().casefold()
+                for verb in (action.verb, words.get(action.verb, ""))
+                if verb
+            ]
+            for actions in self.legal.values()
+            for action in actions
+        }
+        for fits in (str.__eq__, str.startswith):
+            found = [
+                one for one, every in names.items() if any(fits(each, wanted) for each in every)
+            ]
+            if wanted and len(found) == 1:
+                return found[0]
+        return None
+
     def allows(self, action: Action) -> bool:
         """Whether an action is legal."""
         return action in self.legal.get(action.verb, ())

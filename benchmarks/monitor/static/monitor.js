@@ -39,6 +39,7 @@ const turnInto = (old, fresh) => {
     if (old.data !== fresh.data) old.data = fresh.data;
     return;
   }
+  if (old.hasAttribute("data-own")) return;  // what it holds is a script's
   for (const { name } of [...old.attributes]) if (name !== "open" && !fresh.hasAttribute(name)) old.removeAttribute(name);
   for (const { name, value } of fresh.attributes) if (name !== "open" && old.getAttribute(name) !== value) old.setAttribute(name, value);
   const wanted = new Set([...fresh.childNodes].map(nameOf)), named = new Map();
@@ -81,6 +82,7 @@ if (live) {
       if (!old || old.isEqualNode(fresh)) continue;
       if (isSelected(old)) waits = true; else turnInto(old, fresh);
     }
+    document.dispatchEvent(new Event("renewed"));
   };
   document.addEventListener("selectionchange", () => {
     if (waits && getSelection().isCollapsed) { waits = false; renew().catch(() => { waits = true; }); }

@@ -27,7 +27,7 @@ if (board()) {
     document.title = page.title;
     for (const details of fresh.querySelectorAll(".played-steps details")) details.open = open.has(details.closest("li").value);
     if (!inside) return;
-    const same = was.dataset.press ? fresh.querySelector(name("data-press", was.dataset.press))
+    const same = was.id ? fresh.querySelector("#" + CSS.escape(was.id)) : was.dataset.press ? fresh.querySelector(name("data-press", was.dataset.press))
       : fresh.querySelector("button" + name("name", "action") + name("value", was.value))
         || (group && fresh.querySelector("fieldset" + name("data-verb", group.dataset.verb) + " button"));
     (same || fresh).focus({ preventScroll: true });
@@ -95,9 +95,11 @@ if (board()) {
     return Boolean(group);
   };
   document.addEventListener("keydown", (event) => {
+    if (event.target.id === "typed" && event.key === "Escape") event.target.blur();
     if (event.altKey || event.ctrlKey || event.metaKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) return;
     if (document.querySelector("dialog[open]")) return;
-    const key = event.key.toLowerCase();
+    const key = event.key.toLowerCase(), field = document.getElementById("typed");
+    if (key === "/" && field && !sending) { event.preventDefault(); field.focus(); return; }
     if (sending && /^([a-z ]|enter|escape|arrow\w+)$/.test(key)) {
       event.preventDefault();
       if (!event.repeat) typed.push(key);
