@@ -269,7 +269,9 @@ class RunView:
     def means(self) -> tuple[Means | None, Mapping[str, Means]]:
         """The metrics over all episodes whose records have been read, and those that stand beside
         success by group."""
-        at = self.figures.done, self._tail.version, len(self._rows)
+        # While records are read, they are taken again for each twentieth of them.
+        ended = sum(row.ended is not None for row in self._rows.values())
+        at = 20 * self.figures.done // max(1, ended), ended, self._tail.version
         if self._means is None or self._means[0] != at:
             rows = self._rows.values()
             told = {

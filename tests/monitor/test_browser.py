@@ -238,6 +238,7 @@ def test_a_person_plays_a_whole_task_to_success(page, serve, runs, tmp_path):
     page.wait_for_function(
         "() => { const n = document.forms.choose.elements.task.length; return n > 1 && n < 50; }"
     )
+    assert page.input_value("select[name=task]") == ""  # until one is chosen, the next one
     page.select_option("select[name=task]", record.task_id)
     page.click("button.main")
     for number, step in enumerate(record.steps[1:], 1):
@@ -302,7 +303,7 @@ def test_keys_are_kept_while_an_action_is_on_its_way_and_pictures_lie_as_seen(
     page.wait_for_function("() => document.activeElement.value === 'observe'")
     across = "one => document.querySelector('figure.' + one).getBoundingClientRect().x"
     left, ahead, right = (page.evaluate(across, one) for one in ("left", "ahead", "right"))
-    assert left < ahead < right
+    assert left < ahead < right < page.evaluate("document.querySelector('.choices').offsetLeft")
 
     page.click("figure.right a")
     page.wait_for_function(

@@ -46,12 +46,10 @@ def test_its_steps_room_and_key_actions_are_shown_as_they_come(last, visit):
 
     actions = [f"{each.verb} {each.object_type}".strip() for each in record.steps[1:]]
     assert len(steps()) == 3
-    thought = (
-        '{"kind":"step","task_id":%s,"step":3,"verb":"observe","success":false,"reward":1.0'
-        % (json.dumps(record.key))
-    )
+    step = {"kind": "step", "task_id": record.key, "step": 3, "verb": "observe", "success": False}
+    step |= {"reward": 1.0, "thought": "<script>x</script>"}
     with (folder / EVENTS).open("a") as file:
-        file.write(thought + ',"thought":"<script>x</script>"}\n' + rest[0].replace("step", "ste"))
+        file.write(json.dumps(step, separators=(",", ":")) + "\n" + rest[0].replace("step", "ste"))
     shown = steps()
     assert len(shown) == 4
     assert all(action in said for action, said in zip(actions[:2], shown[1:], strict=False))

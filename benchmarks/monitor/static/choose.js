@@ -16,8 +16,13 @@ if (form) {
       const page = new DOMParser().parseFromString(await answer.text(), "text/html");
       const fresh = page.getElementById("choose");
       if (number !== asked || !fresh) return;
+      // Each option that leaves its own list has been chosen there in its turn, so all of them are here.
       task.replaceChildren(...fresh.elements.task.children);
-      if (event.target === suite) type.replaceChildren(...fresh.elements.type.children);
+      task.value = "";
+      if (event.target === suite) {
+        type.replaceChildren(...fresh.elements.type.children);
+        type.value = "";
+      }
       document.getElementById("about").textContent = page.getElementById("about").textContent;
     } catch (error) {
       // The server is away: the next task of the choice can still be begun once it is back.

@@ -58,10 +58,11 @@ if (board) {
   const draw = () => {
     for (const chart of charts) chart.destroy();
     charts = [];
-    // What most runs have comes first.
+    // What tells most comes first, and what most runs have.
+    const rank = (name) => [/success/, /rew|return/, /loss/, /^(?!.*(seconds|fps|epoch|memory))/].findIndex((kind) => kind.test(name)) >>> 0;
     const count = new Map();
     for (const run of runs) for (const name of Object.keys(run.series)) count.set(name, (count.get(name) || 0) + 1);
-    const names = [...count.keys()].sort((a, b) => count.get(b) - count.get(a));
+    const names = [...count.keys()].sort((a, b) => rank(a) - rank(b) || count.get(b) - count.get(a));
     const wanted = controls.only.value.toLowerCase();
     const shown = names.filter((name) => name.toLowerCase().includes(wanted));
     board.replaceChildren();

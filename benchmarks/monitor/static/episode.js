@@ -31,7 +31,10 @@ const setUp = (player, moved) => {
       const address = frame.dataset.frame + `&n=${stood}&what=${drawn}`;
       if (drawn && frame.getAttribute("src") !== address) frame.src = address;
       frame.hidden = !drawn;
-      for (const words of all("draw")) words.parentElement.hidden = Boolean(drawn);
+      for (const words of all("draw")) {  // nothing was shown, so there is a choice once something is drawn
+        words.parentElement.hidden = Boolean(drawn);
+        view.parentElement.hidden = !drawn;
+      }
     }
     all("key-action").forEach((each, place) => each.classList.toggle("done", done.has(place)));
     for (const stand of map.querySelectorAll("[data-map-step]"))
@@ -107,7 +110,10 @@ if (players.length) {
     before = longest();
   });
   const asked = /^#(?:[a-z]+-)?step-(\d+)$/.exec(location.hash);
-  if (asked) moveTo(Number(asked[1]), true);
-  else if (document.querySelector("[data-under-way]")) moveTo(longest(), true);
+  if (asked) {
+    moveTo(Number(asked[1]), true);
+    // The browser goes to the step alone; its picture is to be seen with it.
+    addEventListener("load", () => document.querySelector("[data-player]").scrollIntoView());
+  } else if (document.querySelector("[data-under-way]")) moveTo(longest(), true);
   else players.forEach((each) => each.show(0, false));
 }
