@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from markupsafe import Markup
+
 
 def percent(rate: float | None) -> str:
     """A fraction in %, with one decimal place."""
@@ -74,6 +76,11 @@ def brief(text: str) -> str:
     return visible(text, 2_000)
 
 
+def path(text: str) -> Markup:
+    """As :func:`brief`, for a path: it may be parted behind each slash."""
+    return Markup("/<wbr>").join(brief(text).split("/"))
+
+
 _PIECE = 4_000
 _MARK = "[\u0300-\u036f\u0483-\u0489\u1ab0-\u1aff\u1dc0-\u1dff\u20d0-\u20ff\ufe20-\ufe2f]"
 _MARKS = re.compile(f"(?<={_MARK}{{4}}){_MARK}+")
@@ -99,5 +106,6 @@ FILTERS: Mapping[str, Callable[..., Any]] = {
     "visible": visible,
     "pieces": pieces,
     "brief": brief,
+    "path": path,
 }
 """The functions by their names in templates."""

@@ -64,7 +64,9 @@ def test_runs_are_searched_sorted_tagged_and_ticked(runs, tmp_path, visit):
     client = visit(tmp_path)
 
     def listed(query: str) -> list[str]:
-        return re.findall(r"<tr data-row.*?/([a-z]+)</a>", client.get(f"/?{query}").text, re.DOTALL)
+        return re.findall(
+            r"<tr data-row.*?<wbr>([a-z]+)</a>", client.get(f"/?{query}").text, re.DOTALL
+        )
 
     assert listed("") == ["oracle", "random"]
     assert listed("sort=success") == ["random", "oracle"]
