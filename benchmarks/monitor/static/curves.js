@@ -90,7 +90,8 @@ if (board) {
       const size = () => ({ width: Math.max(240, place.clientWidth), height: 260 });
       const chart = new uPlot({
         ...size(), series, bands,
-        cursor: { sync: { key: "curves" }, drag: { x: true, y: true, uni: 30 } },
+        // All charts show the same place, but each is zoomed by itself.
+        cursor: { sync: { key: "curves", filters: { pub: (kind) => /^mouse(move|leave)$/.test(kind) } }, drag: { x: true, y: true, uni: 30 } },
         scales: { x: { time: false, distr: controls.logx.checked ? 3 : 1 }, y: { distr: controls.logy.checked ? 3 : 1 } },
         axes: [{ ...axis }, { ...axis, size: 64, values: (self, ticks) => ticks.map(written) }],
       }, uPlot.join(tables), place);
