@@ -102,7 +102,7 @@ def _export(options: FileOptions, out: Path) -> None:
 
 def _filter(only: Sequence[str]) -> Any:
     """The filter that the options name."""
-    from benchmarks.monitor.run_view import SORTS, Filter
+    from benchmarks.monitor.episode_filter import SORTS, Filter
 
     names = [name for name in Filter.names() if name != "page"]
     given: dict[str, str] = {}

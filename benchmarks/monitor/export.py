@@ -35,13 +35,13 @@ from markupsafe import Markup
 from agents.vlm.record import PictureRecord
 from benchmarks.monitor import formats
 from benchmarks.monitor.directories import Directories
+from benchmarks.monitor.episode_filter import FLAG, SORTS, Filter
 from benchmarks.monitor.episode_view import EpisodeView, StepView, picture_file, view_of
 from benchmarks.monitor.event_tail import EpisodeRow
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.listing import Page
 from benchmarks.monitor.pages.replays import PICTURE_KINDS, drawn_room, no_room
 from benchmarks.monitor.pages.runs import run_variables
-from benchmarks.monitor.run_view import FLAG, SORTS, Filter
 from benchmarks.monitor.site import Site
 from benchmarks.monitor.world import CannotReplay, Worlds
 from er_gym.data.pictures import encode_picture

@@ -16,7 +16,8 @@ from benchmarks.monitor.charts import as_svg
 from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.fingerprint import changed, in_use
 from benchmarks.monitor.language import Translator
-from benchmarks.monitor.run_view import RunSummary, SuccessCount
+from benchmarks.monitor.run_view import RunSummary
+from benchmarks.monitor.success_count import SuccessCount
 from benchmarks.scoring.metrics import Estimate
 from benchmarks.study.charts import Shown
 from benchmarks.study.kinds import KINDS, Study

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
 
 from benchmarks.monitor.directories import Directory
+from benchmarks.monitor.episode_filter import Filter, room_number
 from benchmarks.monitor.event_tail import EpisodeRow, EventTail
 from benchmarks.monitor.fingerprint import in_use
 from benchmarks.monitor.followed import Followed
-from benchmarks.monitor.listing import TaskFilter
 from benchmarks.monitor.notes import NotesTail
 from benchmarks.monitor.record_figures import (
     BESIDE_SUCCESS,
@@ -23,7 +22,7 @@ from benchmarks.monitor.record_figures import (
 from benchmarks.monitor.record_rows import RecordRows
 from benchmarks.monitor.server_tail import ServerTail
 from benchmarks.monitor.spending_tail import SpendingTail
-from benchmarks.scoring.metrics import success_rate
+from benchmarks.monitor.success_count import SuccessCount
 from benchmarks.scoring.samples import TaskSamples, group_by, most_samples, task_samples
 from er_gym.locking import LOCK
 from er_gym.rollout.causes import count_causes
@@ -37,125 +36,9 @@ from er_gym.rollout.run_directory import (
 )
 from er_gym.tasks.types import task_type
 
-FLAG = "flag"
 _SILENT_SECONDS = 120.0
 """A run without a lock and without an event for so long is not counted as playing."""
 _RECENT_SECONDS = 60.0
-
-
-SORTS: Mapping[str, Callable[[EpisodeRow], Any]] = {
-    "ended": lambda row: row.ended or float("inf"),
-    "task": lambda row: row.key,
-    "type": lambda row: row.task_type,
-    "scene": lambda row: _room_number(row.scene),
-    "outcome": lambda row: row.outcome,
-    "reason": lambda row: row.end_reason,
-    "failure": lambda row: row.failure,
-    "efficiency": lambda row: row.metric("search_efficiency") or 0.0,
-    "completeness": lambda row: row.metric("completeness") or 0.0,
-    "steps": lambda row: row.steps,
-    "reward": lambda row: row.reward,
-    "tokens": lambda row: row.tokens,
-    "cost": lambda row: row.cost,
-    "seconds": lambda row: row.seconds,
-}
-"""What rows can be sorted by."""
-
-
-def _room_number(scene: str) -> tuple[int, str]:
-    digits = "".join(char for char in scene if char.isascii() and char.isdigit())
-    return (int(digits[:9]) if digits else -1, scene)
-
-
-@dataclass(frozen=True)
-class Filter(TaskFilter[EpisodeRow]):
-    """Which episodes of a run are shown.
-
-    Attributes:
-        scene, outcome, failure, reason: exact values; "" for any.
-        note: ``flag`` for those that are flagged, ``note`` for all of which something is noted; ""
-            for any.
-        steps: ``5``, ``5-10``, ``-10`` or ``5-``; "" for any.
-    """
-
-    sorts: ClassVar[Mapping[str, Callable[[EpisodeRow], Any]]] = SORTS
-
-    scene: str = ""
-    outcome: str = ""
-    failure: str = ""
-    reason: str = ""
-    note: str = ""
-    steps: str = ""
-    sort: str = "-ended"
-
-    def takes(self, row: EpisodeRow) -> bool:
-        """Whether a row is shown."""
-        exact = {
-            "scene": row.scene,
-            "outcome": row.outcome,
-            "failure": row.failure,
-            "reason": row.end_reason,
-        }
-        noted = row.note.text if row.note else ""
-        said = f"{row.key} {row.instruction} {noted}"
-        return (
-            self.matches(row.task_type, exact, said)
-            and _within(row.steps, self.steps)
-            and (not self.note or (row.note is not None and (self.note != FLAG or row.note.flag)))
-        )
-
-
-def _within(number: int, bounds: str) -> bool:
-    low, dash, high = bounds.partition("-")
-    if not all(part.isascii() and (part.isdigit() or not part) for part in (low, high)):
-        return True
-    if not dash:
-        return not low or number == int(low)
-    return (not low or number >= int(low)) and (not high or number <= int(high))
-
-
-@dataclass(frozen=True)
-class SuccessCount:
-    """A count of successes, as reports have it (:mod:`er_gym.rollout.outcomes`).
-
-    Attributes:
-        name: of what was counted.
-        results: the task of each episode that has come out, and whether it is a success.
-        rate, low, high: success with its 95 % interval, as fractions; None without episodes.
-    """
-
-    name: str
-    results: Sequence[tuple[str, bool]] = field(default=(), repr=False)
-    rate: float | None = None
-    low: float | None = None
-    high: float | None = None
-
-    @property
-    def n(self) -> int:
-        """How many episodes have come out."""
-        return len(self.results)
-
-    @property
-    def successes(self) -> int:
-        """How many of them are a success."""
-        return sum(success for _, success in self.results)
-
-    @staticmethod
-    def over(name: str, results: Sequence[tuple[str, bool]]) -> SuccessCount:
-        """Count some results."""
-        if not results:
-            return SuccessCount(name)
-        tasks, successes = zip(*results, strict=True)
-        estimate = success_rate(tasks, successes)
-        return SuccessCount(name, results, estimate.mean, estimate.low, estimate.high)
-
-    @staticmethod
-    def of(name: str, rows: Iterable[EpisodeRow]) -> SuccessCount:
-        """Count the episodes of a run."""
-        told = [row.result for row in rows]
-        return SuccessCount.over(
-            name, [(row.task_id, row.success) for row in told if row is not None]
-        )
 
 
 @dataclass(frozen=True)
@@ -376,7 +259,7 @@ class RunView:
         rows = self._rows.values()
         return {
             "type": sorted({row.task_type for row in rows}),
-            "scene": sorted({row.scene for row in rows}, key=_room_number),
+            "scene": sorted({row.scene for row in rows}, key=room_number),
             "outcome": sorted({row.outcome for row in rows}),
             "failure": sorted({row.failure for row in rows} - {""}),
             "reason": sorted({row.end_reason for row in rows} - {""}),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.monitor.sensor_pictures import SHOWN
 from er_gym.envs.actions import NO_ACTION, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.records import ERROR, EpisodeRecord
@@ -144,7 +145,7 @@ class Worlds:
             for step in record.steps[1 : number + 1]:
                 if not step.appended:
                     obs, *_ = env.step(action_in(step.verb, step.object_type))
-            picture = _SHOWN[what](obs[what]) if what in _SHOWN else env.render()
+            picture = SHOWN[what](obs[what]) if what in SHOWN else env.render()
             if not isinstance(picture, np.ndarray):
                 raise CannotReplay("nothing is drawn")
             return picture
@@ -307,30 +308,3 @@ def _footprint(told: tuple[Mapping[str, Any], str]) -> Footprint:
         holds=bool(one["receptacle"] and not one["pickupable"]) and one["objectType"] != "Floor",
         inside=inside,
     )
-
-
-def depth_picture(depth: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """(height, width, 3) uint8: depths in metres as grey, the nearest surface white and the
-    farthest nearly black."""
-    near, far = float(depth.min()), float(depth.max())
-    grey = 255.0 - 235.0 * (depth - near) / max(far - near, 1e-6)
-    return np.repeat(grey.astype(np.uint8)[:, :, None], 3, axis=2)
-
-
-def instance_picture(ids: NDArray[np.int32]) -> NDArray[np.uint8]:
-    """(height, width, 3) uint8: a colour for each object, dark grey for the room."""
-    numbers = np.arange(int(ids.max()) + 1)
-    # Hues a golden angle apart, so that neighbours in the list of objects look different.
-    hues = numbers[:, None] * 0.618034 + np.array([0.0, 2 / 3, 1 / 3])
-    wheel = np.clip(np.abs((hues % 1.0) * 6 - 3) - 1, 0, 1)
-    bright = (0.55 + 0.15 * (numbers % 4))[:, None]
-    palette = (255 * bright * (0.25 + 0.75 * wheel)).astype(np.uint8)
-    palette[0] = 40
-    return palette[ids]
-
-
-_SHOWN: Mapping[str, Callable[[Any], NDArray[np.uint8]]] = {
-    "depth": depth_picture,
-    "instance": instance_picture,
-}
-"""How an observation that is no picture is shown as one."""

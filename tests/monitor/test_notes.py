@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks.monitor.directories import Directories
+from benchmarks.monitor.episode_filter import Filter
 from benchmarks.monitor.export import ExportRequest, export
 from benchmarks.monitor.notes import CannotNote, Note, note_episode, read_notes, tag_run
-from benchmarks.monitor.run_view import Filter
 from er_gym.rollout.run_directory import NOTES, RunDirectory
 
 HERE = "http://127.0.0.1:8010"

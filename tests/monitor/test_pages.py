@@ -24,9 +24,9 @@ from agents.vlm.clients.budget import Budget, Entry, Ledger
 from agents.vlm.settings import Prices
 from benchmarks.monitor.app import make_app
 from benchmarks.monitor.directories import Directories
+from benchmarks.monitor.episode_filter import Filter
 from benchmarks.monitor.failures import FAILURES, Failure, failure_of
 from benchmarks.monitor.language import words_in
-from benchmarks.monitor.run_view import Filter
 from benchmarks.monitor.site import Site
 from benchmarks.scoring.metrics import score_episode, summarise
 from benchmarks.scoring.scorers import CORRECTED

@@ -10,11 +10,11 @@ from urllib.parse import urlencode
 from fastapi import Request, Response
 
 from benchmarks.monitor.directories import Directory
+from benchmarks.monitor.episode_filter import Filter
 from benchmarks.monitor.episode_view import picture_file, view_of, view_so_far
 from benchmarks.monitor.event_tail import EpisodeRow
 from benchmarks.monitor.listing import neighbours
 from benchmarks.monitor.pages.replays import ReplayPages
-from benchmarks.monitor.run_view import Filter
 from benchmarks.monitor.site import NotFound, Routes, Site, or_nothing
 from benchmarks.monitor.under_way import record_so_far
 from benchmarks.monitor.video import as_webp, film

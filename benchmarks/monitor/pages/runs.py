@@ -7,10 +7,11 @@ from typing import Any
 
 from fastapi import Request, Response
 
+from benchmarks.monitor.episode_filter import Filter
 from benchmarks.monitor.language import Translator
 from benchmarks.monitor.listing import page_of
 from benchmarks.monitor.run_list import RunFilter, choices
-from benchmarks.monitor.run_view import Filter, RunView
+from benchmarks.monitor.run_view import RunView
 from benchmarks.monitor.server_view import server_view
 from benchmarks.monitor.settings_view import settings_of
 from benchmarks.monitor.site import READ_SECONDS, Routes, Site

@@ -9,8 +9,9 @@ from fastapi import Request, Response
 
 from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.pages.curves import CurvePages
-from benchmarks.monitor.run_view import RunSummary, SuccessCount
+from benchmarks.monitor.run_view import RunSummary
 from benchmarks.monitor.site import NotFound, Routes, Site
+from benchmarks.monitor.success_count import SuccessCount
 from benchmarks.monitor.training_view import (
     Trained,
     curves,
