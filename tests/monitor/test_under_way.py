@@ -64,7 +64,7 @@ def test_it_is_told_as_far_as_the_stream_tells_it(last):
     folder, record, _ = last
     # Its process died in a first try: the second begins anew.
     *others, begun, first, second = (folder / EVENTS).read_text().splitlines(keepends=True)
-    tries = (begun, second, first.replace('"step":1', '"step":2'), begun, first, second)
+    tries = (begun, second.replace('"step":2', '"step":1'), begun, first, second)
     (folder / EVENTS).write_text("".join((*others, *tries)))
     row = EpisodeRow(record.key, task_type=record.task_type, scene=record.scene, max_steps=9)
     manifest = RunDirectory.open(folder).manifest
