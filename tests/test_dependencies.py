@@ -102,6 +102,7 @@ USED_OTHERWISE = {
     "qwen-vl-utils": "a test imports it where it is installed",
     "ruff": "a command",
     "sentence-transformers": "imported by its name, late",
+    "sphinx": "a program that a test runs",
     "sphinx-copybutton": "Sphinx finds it by its name",
     "tensorboard": "torch writes its files by it",
     "tqdm": "Stable-Baselines3 draws its bar by it",
