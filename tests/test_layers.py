@@ -36,7 +36,9 @@ _OF_AGENTS = {
     "agents.vlm.parsing": set(),
     "agents.vlm": {"agents.configs", "agents.vlm.parsing"},
     "agents.vlm.clients": {"agents.vlm", "agents.zoo"},
-    "agents.rl": {"agents.configs", "agents.scripted", "agents.scripted.searcher"},
+    "agents.rl": {
+        *("agents.configs", "agents.scripted", "agents.scripted.searcher", "agents.zoo"),
+    },
     "agents": {
         *("agents.configs", "agents.zoo", "agents.rl", *_VLM),
         *("agents.scripted", "agents.scripted.searcher"),

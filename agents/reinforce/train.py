@@ -81,7 +81,7 @@ from agents.vlm.tuned_model import AGENT
 from er_gym.activity import begin
 from er_gym.rollout.env_pool import EnvPool
 from er_gym.rollout.run_directory import Manifest
-from er_gym.tasks.splits import TRAINING_SCENES
+from er_gym.tasks.splits import rooms_kept_for_evaluation
 from er_gym.tasks.suites import Suite, load_suite
 from er_gym.tasks.task import Task
 
@@ -425,7 +425,7 @@ def _greedy(agent: AgentSettings) -> AgentSettings:
 
 
 def _check_suite(suite: Suite, settings: ReinforceSettings) -> None:
-    kept = sorted({task.scene for task in suite.tasks} - {*TRAINING_SCENES})
+    kept = rooms_kept_for_evaluation(suite.tasks)
     if kept or suite.name == settings.validation.suite:
         why = f"plays in rooms that are kept for evaluation, such as {kept[0]}" if kept else (
             "is the one that validation chooses by"

@@ -16,7 +16,7 @@ from stable_baselines3.common.logger import KVWriter, TensorBoardOutputFormat
 from stable_baselines3.common.vec_env import VecEnv
 from torch.utils.tensorboard import SummaryWriter
 
-from agents.rl.config import Phase
+from agents.rl.guidance import Phase
 from agents.rl.model_file import save
 from er_gym.tasks.reading import read_bytes
 from er_gym.writing import write_atomic
@@ -255,7 +255,10 @@ class Curriculum(BetweenRollouts):
 
 
 class SuccessByType(BaseCallback):
-    """Logs the success rate of each task type over its last ``over`` episodes."""
+    """Logs the success rate of each task type over its last ``over`` episodes.
+
+    Episodes that started near their goal are left out: they are easier.
+    """
 
     def __init__(self, over: int = 100) -> None:
         super().__init__()
@@ -265,7 +268,7 @@ class SuccessByType(BaseCallback):
 
     def _on_step(self) -> bool:
         for info in self.locals["infos"]:
-            if "is_success" in info:
+            if "is_success" in info and not info.get("started_at"):
                 self._note(info)
         return True
 

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 import torch
 from sb3_contrib import MaskablePPO
-from sb3_contrib.common.maskable.distributions import MaskableDistribution
 from torch.nn import functional
 
-from agents.rl.config import TrainConfig, WarmStart
+from agents.rl.config import TrainConfig
 from agents.rl.demonstrations import Demonstrations, concatenate
 from agents.rl.envs import make_env
+from agents.rl.guidance import WarmStart
+from agents.rl.policy import outputs
 from agents.rl.vec_env import WorkerVecEnv
 
 
@@ -90,7 +91,7 @@ def clone_behaviour(
                 {key: all_[rows] for key, all_ in demonstrations.obs.items()}
             )[0]
             actions = torch.as_tensor(demonstrations.actions[rows])
-            distribution, values = _outputs(policy, obs, demonstrations.masks[rows])
+            distribution, values = outputs(policy, obs, demonstrations.masks[rows])
             worth = torch.as_tensor(demonstrations.returns[rows])
             log_prob = distribution.log_prob(actions)
             loss = 0.5 * functional.mse_loss(values.flatten(), worth) - log_prob.mean()
@@ -100,13 +101,3 @@ def clone_behaviour(
             optimizer.step()
             agreed += int((distribution.mode() == actions).sum())
     return agreed / len(demonstrations)
-
-
-def _outputs(policy: Any, obs: Any, legal: Any) -> tuple[MaskableDistribution, torch.Tensor]:
-    """The distribution over actions, and the values (B, 1), in one pass through the network; the
-    policy's own methods would need two."""
-    features = policy.extract_features(obs)
-    actor, critic = policy.mlp_extractor(features)
-    distribution: MaskableDistribution = policy._get_action_dist_from_latent(actor)
-    distribution.apply_masking(legal)
-    return distribution, policy.value_net(critic)

@@ -14,13 +14,11 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from agents.configs import ConfigKind, StrictSettings, load
+from agents.rl.guidance import Fraction, NearGoal, Phase, Positive, Rate, Start, WarmStart
 from er_gym.envs.object_selection import EXPLORE
 from er_gym.tasks.types import canonical_names
 
 _WHAT = "training run"
-Fraction = Annotated[float, Field(ge=0, le=1)]
-Positive = Annotated[int, Field(gt=0)]
-Rate = Annotated[float, Field(gt=0)]
 
 
 class EnvConfig(StrictSettings):
@@ -40,6 +38,7 @@ class EnvConfig(StrictSettings):
         frames: the number of stacked pictures.
         instances: ``explore``, or ``target``, which gives away which object a task is about.
         step_penalty, illegal_penalty: subtracted from the reward, in training only.
+        key_actions: what a key action is worth, in training only.
         success_bonus: added to the reward for a success, in training only, since the last key
             action alone is worth no more than any other.
         shaping: scale of the potential of the key actions left, in training only; 0 for none
@@ -60,6 +59,7 @@ class EnvConfig(StrictSettings):
     instances: Literal["explore", "target"] = EXPLORE  # type: ignore[assignment]
     step_penalty: float = Field(0.01, ge=0)
     illegal_penalty: float = Field(0.0, ge=0)
+    key_actions: float = Field(1.0, ge=0)
     success_bonus: float = Field(1.0, ge=0)
     shaping: float = Field(0.0, ge=0)
     reward: str = ""
@@ -87,53 +87,6 @@ class Evaluation(StrictSettings):
     episodes: str = "er-1k"
     every: Positive = 100_000
     count: Positive = 100
-
-
-class Phase(StrictSettings):
-    """A phase of a curriculum: the task types until ``until`` steps."""
-
-    until: Positive
-    types: tuple[str, ...] = Field(min_length=1)
-
-    _types = field_validator("types")(canonical_names)
-
-
-class Practice(StrictSettings):
-    """Rounds of DAgger after cloning: the policy plays, the searcher labels each step, and the
-    policy is fitted to all data gathered so far (:mod:`agents.rl.practice`).
-
-    Attributes:
-        rounds: how many.
-        steps: environment steps in a round.
-        epochs: passes over all that has been gathered, after each round.
-    """
-
-    rounds: Positive = 4
-    steps: Positive = 20_000
-    epochs: Positive = 2
-
-
-class WarmStart(StrictSettings):
-    """Behaviour cloning before reinforcement learning.
-
-    Attributes:
-        teacher: the imitated agent: ``searcher``, or ``oracle``, which knows the key actions.
-        episodes: the number of its episodes.
-        successes_only: whether failed episodes are left out.
-        epochs, batch_size, learning_rate: of the supervised training.
-        final_learning_rate: the share of the learning rate that remains at its end.
-        practice: rounds of DAgger that follow; None for none. They need ``env.subtasks``, and
-            ``searcher`` as the teacher.
-    """
-
-    teacher: Literal["searcher", "oracle"] = "searcher"
-    episodes: Positive = 2000
-    successes_only: bool = True
-    epochs: Positive = 5
-    batch_size: Positive = 512
-    learning_rate: Rate = 1e-3
-    final_learning_rate: Fraction = 1.0
-    practice: Practice | None = None
 
 
 class Network(StrictSettings):
@@ -196,7 +149,9 @@ class TrainConfig(StrictSettings):
             the same ``vec`` and ``threads``, if the run is not interrupted.
         env, vec, evaluation, network: see their classes.
         curriculum: phases in order; ``env.types`` follow after the last.
+        near_goal: a curriculum of the key actions that are left at the start; None for none.
         warm_start: behaviour cloning; None for none.
+        start: a trained policy to go on from, in place of a warm start; None for none.
         checkpoint_every: steps between two checkpoints; a checkpoint is written after the rollout.
         threads: torch's threads for updates. More than one helps little with so small a network,
             and costs much if other processes need the cores.
@@ -211,7 +166,9 @@ class TrainConfig(StrictSettings):
     vec: VecEnvConfig = VecEnvConfig()
     evaluation: Evaluation | None = Evaluation()
     curriculum: tuple[Phase, ...] = ()
+    near_goal: NearGoal | None = None
     warm_start: WarmStart | None = None
+    start: Start | None = None
     network: Network = Network()
     checkpoint_every: Positive = 50_000
     threads: Annotated[int, Field(gt=0, le=256)] = 1
@@ -233,11 +190,18 @@ class TrainConfig(StrictSettings):
         return self
 
     @model_validator(mode="after")
-    def _warm_start_needs_ppo(self) -> TrainConfig:
-        if self.warm_start is not None and self.algorithm.name != "ppo":
-            raise ValueError(
-                f"warm_start goes with ppo, not with {self.algorithm.name}: leave one out"
-            )
+    def _a_teacher_needs_ppo(self) -> TrainConfig:
+        for name in ("warm_start", "start"):
+            if getattr(self, name) is not None and self.algorithm.name != "ppo":
+                raise ValueError(
+                    f"{name} goes with ppo, not with {self.algorithm.name}: leave one out"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _one_beginning(self) -> TrainConfig:
+        if self.warm_start is not None and self.start is not None:
+            raise ValueError("warm_start and start are two ways to begin: leave one out")
         return self
 
     @model_validator(mode="after")
@@ -282,6 +246,8 @@ def how_learnt(config: TrainConfig, steps: int) -> str:
         parts.append(f"{warm.episodes:,} cloned episodes of the {warm.teacher}")
         if practice := warm.practice:
             parts.append(f"{practice.rounds} rounds of DAgger of {practice.steps:,} steps")
+    if config.start:
+        parts.append(f"the weights of {config.start.policy}")
     if steps or not parts:
         parts.append(f"{steps:,} steps of {ALGORITHM_NAMES[config.algorithm.name]}")
     observed = f"{config.env.obs_mode}{' and subtask' * config.env.subtasks}"

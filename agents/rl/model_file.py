@@ -1,9 +1,9 @@
 """Saves a learner as arrays and JSON; reading the file runs no code.
 
 ``model.npz`` is NumPy's archive of arrays, read without pickle: ``policy/…`` (the weights),
-``optimizer/N/…`` (Adam's state for the N-th weight) and ``about``, JSON in UTF-8 (the algorithm,
-its observations and its progress). ``config.yaml`` beside it holds the rest: the hyper-parameters
-and the shape of the network.
+``optimizer/N/…`` (Adam's state for the N-th weight), ``anchor/…`` (the weights of the policy that a
+run started from) and ``about``, JSON in UTF-8 (the algorithm, its observations and its progress).
+``config.yaml`` beside it holds the rest: the hyper-parameters and the shape of the network.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from agents.rl.policy_file import (
     MODEL,
     about,
     check_about,
+    learner_name,
     model_errors,
     read_about,
     read_tensor,
@@ -37,6 +38,8 @@ from er_gym.writing import write_atomic
 _COUNTERS = ("num_timesteps", "_n_updates", "_episode_num", "_n_calls", "exploration_rate")
 """The progress counters of a learner; not every algorithm has all of them."""
 
+KEPT = "kept_by_callbacks"
+"""The attribute of a learner in which callbacks keep plain data for a continued run."""
 Arrays = dict[str, NDArray[Any]]
 
 
@@ -57,13 +60,21 @@ def _arrays(model: BaseAlgorithm) -> Arrays:
     found = {f"policy/{name}": value for name, value in model.policy.state_dict().items()}
     for number, entries in model.policy.optimizer.state_dict()["state"].items():
         found |= {f"optimizer/{number}/{name}": value for name, value in entries.items()}
+    if anchor := _anchor(model):
+        found |= {f"anchor/{name}": value for name, value in anchor.state_dict().items()}
     return {name: value.detach().cpu().numpy() for name, value in found.items()}
+
+
+def _anchor(model: BaseAlgorithm) -> torch.nn.Module | None:
+    """The network that a learner started from, if it keeps it."""
+    anchor: torch.nn.Module | None = getattr(model, "anchor", None)
+    return anchor
 
 
 def _about(model: BaseAlgorithm) -> dict[str, Any]:
     sees = cast(spaces.Dict, model.observation_space)
     return {
-        **about(type(model).__name__, sees, int(cast(spaces.Discrete, model.action_space).n)),
+        **about(learner_name(type(model)), sees, int(cast(spaces.Discrete, model.action_space).n)),
         "counters": {name: getattr(model, name) for name in _COUNTERS if hasattr(model, name)},
         # Of the last episodes, for the means in the curve.
         "episodes": [
@@ -73,6 +84,7 @@ def _about(model: BaseAlgorithm) -> dict[str, Any]:
         # Of the last update; they are logged with the next rollout.
         "logged": _logged(model),
         "successes": [bool(each) for each in model.ep_success_buffer or ()],
+        KEPT: getattr(model, KEPT, {}),
     }
 
 
@@ -116,6 +128,13 @@ def restore(file: Path, model: BaseAlgorithm) -> None:
                 for name, value in weights.items()
             }
             optimizer = _optimizer(archive, model)
+            if anchor := _anchor(model):
+                anchor.load_state_dict(
+                    {
+                        name: read_tensor(archive, f"anchor/{name}", value)
+                        for name, value in anchor.state_dict().items()
+                    }
+                )
         found: dict[str, Any] = {"policy": policy, "policy.optimizer": optimizer}
         model.set_parameters(found, device="cpu")
         for name in _COUNTERS:
@@ -123,6 +142,7 @@ def restore(file: Path, model: BaseAlgorithm) -> None:
                 setattr(model, name, type(getattr(model, name))(told["counters"][name]))
         for name, kept in (("ep_info_buffer", "episodes"), ("ep_success_buffer", "successes")):
             setattr(model, name, deque(told[kept], maxlen=model._stats_window_size))
+        setattr(model, KEPT, told.get(KEPT, {}))  # older files lack it
 
 
 def _optimizer(archive: zipfile.ZipFile, model: BaseAlgorithm) -> dict[str, Any]:

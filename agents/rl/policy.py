@@ -1,4 +1,4 @@
-"""The type-wise network as a policy for sb3-contrib's MaskablePPO, and its learner."""
+"""The type-wise network as a policy for sb3-contrib's MaskablePPO."""
 
 from __future__ import annotations
 
@@ -6,16 +6,12 @@ from typing import Any
 
 import torch
 from gymnasium import spaces
-from sb3_contrib import MaskablePPO
 from sb3_contrib.common.maskable.distributions import MaskableDistribution
 from sb3_contrib.common.maskable.policies import MaskableActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.type_aliases import Schedule
-from stable_baselines3.common.utils import LinearSchedule
-from stable_baselines3.common.vec_env import VecEnv
 from torch import Tensor, nn
 
-from agents.rl.config import PPO, TrainConfig
 from agents.rl.network import TypeNetwork
 
 
@@ -92,15 +88,11 @@ class TypePolicy(MaskableActorCriticPolicy):
         return self.action_dist.proba_distribution(action_logits=latent_pi)
 
 
-def make(config: TrainConfig, settings: PPO, env: VecEnv) -> MaskablePPO:
-    """Make an untrained learner: proximal policy optimisation over the legal actions."""
-    rate = settings.learning_rate
-    return MaskablePPO(
-        TypePolicy,
-        env,
-        learning_rate=LinearSchedule(rate, rate * settings.final_learning_rate, 1.0),
-        **settings.model_dump(exclude={"name", "learning_rate", "final_learning_rate"}),
-        policy_kwargs=config.network.model_dump(),
-        seed=config.seed,
-        device="cpu",
-    )
+def outputs(policy: Any, obs: Any, legal: Any) -> tuple[MaskableDistribution, Tensor]:
+    """The distribution over actions, and the values (B, 1), in one pass through the network; the
+    policy's own methods would need two."""
+    features = policy.extract_features(obs)
+    actor, critic = policy.mlp_extractor(features)
+    distribution: MaskableDistribution = policy._get_action_dist_from_latent(actor)
+    distribution.apply_masking(legal)
+    return distribution, policy.value_net(critic)

@@ -65,6 +65,12 @@ LEARNERS = {
 }
 
 
+def learner_name(kind: type) -> str:
+    """The name of a learner's class in files; one that extends it plays alike."""
+    known = {learner.name for learner in LEARNERS.values()}
+    return next(each.__name__ for each in kind.__mro__ if each.__name__ in known)
+
+
 def policy_file(path: Path) -> Path:
     """The model file of a run directory or of a model of the zoo; or the file itself.
 
@@ -98,7 +104,7 @@ def load_network(file: Path) -> TypeNetwork:
         ValueError: the file cannot be read or belongs to another learner.
     """
     config = load_config(file.parent / CONFIG)
-    network = _untrained(config)
+    network = untrained_network(config)
     read = _read_safetensors if file.name == POLICY else _read_archive
     with model_errors(file):
         told, weights = read(file, config, network.state_dict())
@@ -180,7 +186,8 @@ def _read_safetensors(
         return told, {name: opened.get_tensor(name) for name in opened.keys()}  # noqa: SIM118
 
 
-def _untrained(config: TrainConfig) -> TypeNetwork:
+def untrained_network(config: TrainConfig) -> TypeNetwork:
+    """The network of a run before it has learnt anything."""
     outputs = config.algorithm.quantiles if config.algorithm.name == "qrdqn" else 1
     space = channels_first(PolicyObservation(config.env).space)
     return TypeNetwork(space, **config.network.model_dump(), outputs=outputs)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+import zlib
 from collections import deque
 from collections.abc import Mapping
 from typing import Any
@@ -86,6 +88,15 @@ class PolicyObservation:
         if self._with_mask:
             made["mask"] = info["action_mask"]
         return made
+
+    def memory(self) -> bytes:
+        """What is remembered of the earlier observations, for :meth:`recall` in this program."""
+        kept = self.subtasks, self._told, self._images
+        return zlib.compress(pickle.dumps(kept), 1)
+
+    def recall(self, memory: bytes) -> None:
+        """Remember that in place of this episode's; the next is :meth:`observe`."""
+        self.subtasks, self._told, self._images = pickle.loads(zlib.decompress(memory))
 
     def _image(self, seen: NDArray[Any]) -> NDArray[np.uint8]:
         """A picture or a depth as (height, width, channels) uint8 of the learner's size."""

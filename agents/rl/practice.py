@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from sb3_contrib import MaskablePPO
 from stable_baselines3.common.vec_env import VecEnv
 
-from agents.rl.config import Practice, TrainConfig
+from agents.rl.config import TrainConfig
 from agents.rl.demonstrations import Demonstrations, concatenate
 from agents.rl.envs import ADVICE, make_env
+from agents.rl.guidance import Practice
 from agents.rl.packed import PackedRows, packed, taken
 from agents.rl.vec_env import WorkerVecEnv
 

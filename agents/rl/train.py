@@ -25,7 +25,8 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 from torch.distributions import Distribution
 
 from agents.configs import dump
-from agents.rl import dqn, policy
+from agents.rl import dqn, ppo
+from agents.rl.anchored import AnchoredPPO, starting_network
 from agents.rl.callbacks import (
     CURVE,
     Checkpoints,
@@ -42,6 +43,8 @@ from agents.rl.callbacks import (
 from agents.rl.config import EnvConfig, Evaluation, TrainConfig, load_config
 from agents.rl.envs import evaluation_config, make_env
 from agents.rl.model_file import placeholder_env, restore, restore_logged_values, save
+from agents.rl.near_goal import check_tasks
+from agents.rl.near_goal_callback import NearGoalCurriculum
 from agents.rl.policy_file import CONFIG, LEARNERS, MODEL
 from agents.rl.policy_observation import PolicyObservation
 from agents.rl.vec_env import WorkerVecEnv
@@ -57,7 +60,7 @@ _EVALUATION_SEED = 10_000
 
 
 ALGORITHMS: Mapping[str, Callable[..., BaseAlgorithm]] = {
-    "ppo": policy.make,
+    "ppo": ppo.make,
     "dqn": dqn.make,
     "qrdqn": dqn.make,
 }
@@ -122,11 +125,18 @@ def _train(
     evaluated = config.evaluation is None or before >= steps  # else it was killed meanwhile
     if model is not None and steps >= config.total_steps and evaluated:
         return model
+    start = None
+    if config.start is not None and model is None:
+        begin(f"reading {config.start.policy}")
+        start = starting_network(config, config.start)
+    if config.near_goal is not None:
+        check_tasks(config)
     make_learner = ALGORITHMS[config.algorithm.name]
     # A continued run plays different episodes than at its start.
     seed = int(np.random.SeedSequence([config.seed, steps]).generate_state(1)[0])
     begin(f"starting {config.vec.envs} environments in {config.vec.workers} workers")
-    env = make_vec_env(config, config.env, seed)
+    near = 0.0 if config.near_goal is None else config.near_goal.share
+    env = make_vec_env(config, config.env, seed, near)
     checkpoints = Checkpoints(run, config.checkpoint_every)
     callbacks = [checkpoints, TorchThreads(config.threads), SuccessByType(), *more]
     held_out = None
@@ -139,6 +149,10 @@ def _train(
             curriculum = Curriculum(config.curriculum, config.env.types)
             curriculum.set_types(env, steps)
             callbacks.append(curriculum)
+        if config.near_goal is not None:
+            near_goal = NearGoalCurriculum(config.near_goal)
+            near_goal.begin(env, model)
+            callbacks.append(near_goal)
         if show_progress:
             callbacks.append(ProgressBarCallback())
         begin("making the network")
@@ -153,6 +167,9 @@ def _train(
                     warm_start(model, config, config.warm_start, run, seed, show_progress)
                 logger.dump(0)  # a line with its duration
                 save(model, run)
+            if start is not None:
+                assert isinstance(model, AnchoredPPO)  # as the configuration has checked
+                model.begin_from(start)
             env.seed(seed)
         else:
             model.set_env(env)
@@ -219,11 +236,14 @@ def load_last_checkpoint(run: Path) -> BaseAlgorithm | None:
     return model
 
 
-def make_vec_env(config: TrainConfig, options: EnvConfig, seed: int) -> VecEnv:
-    """Make ``config.vec.envs`` environments in worker processes with consecutive seeds; each
-    process plays in its share of the rooms."""
+def make_vec_env(config: TrainConfig, options: EnvConfig, seed: int, near: float = 0.0) -> VecEnv:
+    """Make ``config.vec.envs`` environments in worker processes with consecutive seeds.
+
+    Each process plays in its share of the rooms, and starts the share ``near`` of its episodes near
+    their goals.
+    """
     needs_mask = LEARNERS[config.algorithm.name].needs_mask
-    make = partial(make_env, options, config.algorithm.gamma, needs_mask)
+    make = partial(make_env, options, config.algorithm.gamma, needs_mask, near=near)
     env = VecMonitor(WorkerVecEnv([make] * config.vec.envs, config.vec.workers))
     env.seed(seed)
     return env

@@ -33,7 +33,7 @@ class StepBatch(NamedTuple):
         dones: (k,) bool.
         masks: (k, A) int8, the actions that are legal now.
         infos: k small dictionaries: of an episode that has ended its ``is_success``, ``task_type``,
-            ``end_reason`` and ``terminal_observation``, otherwise empty.
+            ``end_reason``, ``started_at`` and ``terminal_observation``, otherwise empty.
     """
 
     obs: Obs
@@ -72,6 +72,7 @@ class WorkerEnvs:
                 "is_success": bool(final["success"][row]),
                 "task_type": final["task_type"][row],
                 "end_reason": final["end_reason"][row],
+                "started_at": int(final["started_at"][row]),
             }
         return StepBatch(obs, rewards.astype(np.float32), dones, info["action_mask"], told)
 

@@ -13,8 +13,9 @@ import numpy as np
 from sb3_contrib import MaskablePPO
 
 from agents.rl.cloning import clone_behaviour, collect_demonstrations
-from agents.rl.config import Practice, TrainConfig, WarmStart
+from agents.rl.config import TrainConfig
 from agents.rl.demonstrations import Demonstrations, concatenate
+from agents.rl.guidance import Practice, WarmStart
 from agents.rl.practice import advised_envs, play_with_advice
 from er_gym.writing import write_atomic
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 from er_gym.tasks import verbs
 from er_gym.tasks.task import Task, type_of_id
@@ -81,6 +81,11 @@ def split_of(scene: str, subjects: Collection[str]) -> str:
     new_object = not UNSEEN_TYPES.isdisjoint(subjects)
     new = [name for name, is_new in (("room", new_room), ("object", new_object)) if is_new]
     return f"unseen {' and '.join(new)}" if new else "seen"
+
+
+def rooms_kept_for_evaluation(tasks: Iterable[Task]) -> list[str]:
+    """The scenes of some tasks that are not :data:`TRAINING_SCENES`, in alphabetical order."""
+    return sorted({task.scene for task in tasks} - {*TRAINING_SCENES})
 
 
 def is_strictly_unseen(subjects: Collection[str]) -> bool:

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import pytest
 
 from agents.expert.recipe import Part
-from agents.rl.config import EnvConfig, Phase
+from agents.rl.config import EnvConfig
+from agents.rl.guidance import Phase
 from benchmarks.cli.suites import chosen_tasks
 from benchmarks.study.checks import check_tasks
 from benchmarks.study.ladder_settings import LadderSettings

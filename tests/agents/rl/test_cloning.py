@@ -11,9 +11,10 @@ import pytest
 
 from agents import make_agent
 from agents.rl.cloning import clone_behaviour, collect_demonstrations
-from agents.rl.config import TrainConfig, WarmStart
+from agents.rl.config import TrainConfig
 from agents.rl.demonstrations import TEACHERS, Demonstrations, demonstrate
 from agents.rl.envs import make_env
+from agents.rl.guidance import WarmStart
 from agents.rl.train import ALGORITHMS, make_vec_env, train
 from er_gym.envs.actions import INDEX, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
