@@ -8,8 +8,9 @@ from weakref import ReferenceType, ref
 
 from er_gym.sim.actions import perform
 from er_gym.sim.errors import ActionFailed, WrongCall
+from er_gym.sim.house.build import EMPTY, house_scene
 from er_gym.sim.lazy_metadata import LazyMetadata
-from er_gym.sim.metadata import metadata
+from er_gym.sim.metadata import PROCEDURAL, metadata
 from er_gym.sim.render.view import View, draw, with_flags
 from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError, load_scene
 from er_gym.sim.settings import LIGHTS, SOFT, Settings
@@ -102,7 +103,7 @@ class Engine:
         if not isinstance(name, str):
             raise ActionFailed(f"sceneName is a text such as FloorPlan1, not {name!r:.200}.")
         try:
-            scene = load_scene(name)
+            scene = house_scene(EMPTY) if name == PROCEDURAL else load_scene(name)
         except UnknownSceneError as error:
             raise ActionFailed(str(error)) from None
         now = self.world.settings

@@ -24,6 +24,11 @@ def scene_bounds(world: World) -> dict[str, Any]:
     return box(*room_bounds(world.scene.name))
 
 
+def scene_label(world: World) -> str:
+    """AI2-THOR's name of the scene: all houses have one."""
+    return PROCEDURAL if world.scene.shell is not None else f"{world.scene.name}_physics"
+
+
 def _agent(world: World) -> dict[str, Any]:
     agent = world.agent
     return {
@@ -46,6 +51,10 @@ def _held_pose(world: World) -> dict[str, Any]:
         "localRotation": vector(in_camera_frame(agent, turned)),
         "rotation": vector(unity_angles(turned)),
     }
+
+
+PROCEDURAL = "Procedural"
+"""AI2-THOR's name of the scene in which houses are created."""
 
 
 @lru_cache(maxsize=65536)
@@ -132,7 +141,7 @@ def metadata(
         "cameraOrthSize": _orthographic_size(world),
         "collided": False,
         "collidedObjects": [],
-        "sceneName": f"{world.scene.name}_physics",
+        "sceneName": scene_label(world),
         "lastAction": action,
         "errorMessage": error,
         "errorCode": error_code,

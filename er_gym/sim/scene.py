@@ -13,9 +13,12 @@ from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
+
+from er_gym.sim.shell import Shell
 
 PROPERTIES = (
     "receptacle",
@@ -59,7 +62,13 @@ SCENE_NAMES = tuple(f"FloorPlan{n}" for numbers in SCENE_NUMBERS.values() for n 
 
 
 def scene_category(scene_name: str) -> str:
-    """ "kitchens", "living_rooms", "bedrooms" or "bathrooms": a key of :data:`SCENE_NUMBERS`."""
+    """ "kitchens", "living_rooms", "bedrooms" or "bathrooms": a key of :data:`SCENE_NUMBERS`.
+
+    A house has the kind of its first room.
+    """
+    house = HOUSES.get(scene_name)
+    if house is not None and house.shell is not None:
+        return house.shell.category
     number = int(scene_name.removeprefix("FloorPlan"))
     return next(category for category, numbers in SCENE_NUMBERS.items() if number in numbers)
 
@@ -127,6 +136,7 @@ class Scene:
             stand, sorted by z, then x.
         openable_poses: for some objects, by index, a reachable pose from which the agent can open
             the object or use it as a receptacle. Not every openable object has one.
+        shell: the rooms and walls of a house, None for a recorded room.
     """
 
     name: str
@@ -149,6 +159,7 @@ class Scene:
     controlled: tuple[tuple[int, ...] | None, ...]
     reachable: NDArray[np.float64]
     openable_poses: Mapping[int, OpenablePose]
+    shell: Shell | None = None
 
     def __post_init__(self) -> None:
         for value in vars(self).values():
@@ -163,8 +174,12 @@ class Scene:
         return f"Scene({self.name!r}, {len(self)} objects)"
 
 
+HOUSES: WeakValueDictionary[str, Scene] = WeakValueDictionary()
+"""The houses that are in use, by the names of their scenes (:mod:`er_gym.sim.house`)."""
+
+
 def load_scene(name: str) -> Scene:
-    """Load a packaged scene; loading it again gives the same object.
+    """Load a packaged scene, or a house that is in use; loading it again gives the same object.
 
     Args:
         name: ``"FloorPlan1"``, or AI2-THOR's file name for the same room, ``"FloorPlan1_physics"``.
@@ -172,6 +187,9 @@ def load_scene(name: str) -> Scene:
     Raises:
         UnknownSceneError: ``name`` is not one of :data:`SCENE_NAMES`.
     """
+    house = HOUSES.get(name)
+    if house is not None:
+        return house
     plain = name.removesuffix("_physics")
     if plain not in SCENE_NAMES:
         raise UnknownSceneError(name)

@@ -8,6 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from er_gym.sim.scene import HOUSES
+
 START_POSES = Path(__file__).parent / "data" / "start_poses.json"
 """Built by :mod:`er_gym.sim.data.build_start_poses`."""
 
@@ -26,8 +28,13 @@ class StartPose(NamedTuple):
 
 
 def start_pose(scene_name: str) -> StartPose:
-    """The pose after ``Initialize`` in a recorded scene; the agent stands and looks level."""
-    return _table()[scene_name]
+    """The pose after ``Initialize`` in a scene; the agent stands and looks level."""
+    recorded = _table().get(scene_name)
+    if recorded is not None:
+        return recorded
+    shell = HOUSES[scene_name].shell
+    assert shell is not None
+    return StartPose(*shell.start)
 
 
 @cache

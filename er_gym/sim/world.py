@@ -117,6 +117,12 @@ class World(SceneObjects):
         world.agent = Agent(position, start.rotation)
         return world
 
+    def enter(self, scene: Scene) -> None:
+        """Become another scene, as recorded; the settings and what chance draws by stay."""
+        fresh = World.load(scene, self.settings)
+        fresh.chance = self.chance
+        vars(self).update(vars(fresh))
+
     def snapshot(self) -> World:
         """A copy of the objects as they are now, which :meth:`restore` takes. It becomes
         :attr:`base`."""

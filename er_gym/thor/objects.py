@@ -154,22 +154,32 @@ def objects_of(event: Any) -> _Seen:
     metadata = event.metadata
     if isinstance(metadata, LazyMetadata):
         world = metadata.source
-        if isinstance(world, World) and world.exists.all():
+        if isinstance(world, World) and _is_whole(world):
             return _of_world_seen(world)
     return _of_entries(metadata)
 
 
 def objects_in(world: World) -> _Seen:
     """The same for the embedded engine's world as it is now."""
-    if world.exists.all():
+    if _is_whole(world):
         return _of_world_seen(world)
     # Something has been sliced, broken or taken away.
     return _of_entries({"objects": objects(world), "inventoryObjects": inventory(world)})
 
 
+def _is_whole(world: World) -> bool:
+    """Whether the table can be read off the world: nothing has been taken away, nor added to a
+    house."""
+    return bool(world.exists.all()) and (
+        world.scene.shell is None or len(world) == len(world.scene)
+    )
+
+
 def _of_world_seen(world: World) -> _Seen:
-    seen = visible(world)
-    return _of_world(world), seen, seen
+    table, seen = _of_world(world), visible(world)
+    if len(table) < len(seen):
+        seen = seen[: len(table)]
+    return table, seen, seen
 
 
 def _of_entries(metadata: Mapping[str, Any]) -> _Seen:
@@ -221,11 +231,15 @@ class _Names:
     @staticmethod
     def of(source: Scene | World) -> _Names:
         ids = tuple(source.object_ids)
+        types = source.types
+        if not KIND_OF.keys() >= set(types):  # the walls and doors of a house come last
+            types = types[: next(k for k, name in enumerate(types) if name not in KIND_OF)]
+            ids = ids[: len(types)]
         return _Names(
             ids=ids,
             row={object_id: k for k, object_id in enumerate(ids)},
-            kinds=np.array([KIND_OF[name] for name in source.types], dtype=np.intp),
-            controlled=tuple(tuple(rows or ()) for rows in source.controlled),
+            kinds=np.array([KIND_OF[name] for name in types], dtype=np.intp),
+            controlled=tuple(tuple(rows or ()) for rows in source.controlled[: len(types)]),
         )
 
 
@@ -237,7 +251,10 @@ def _recorded_names(scene: Scene) -> _Names:
 def _names(world: World) -> _Names:
     recorded = _recorded_names(world.scene)
     # Tuples of the same string objects are compared by identity, so this costs next to nothing.
-    return recorded if tuple(world.object_ids) == recorded.ids else _Names.of(world)
+    ids = tuple(world.object_ids)
+    if len(recorded.ids) < len(world.scene):
+        ids = ids[: len(recorded.ids)]
+    return recorded if ids == recorded.ids else _Names.of(world)
 
 
 _DERIVED_KEPT = 1024
@@ -253,7 +270,7 @@ def _of_world(world: World) -> ObjectTable:
         found = world.cache.state.put(_TABLE, _table(world))
     elif world.held >= 0:  # the held object moves with the agent
         low, high = boxes_with_doors(world)
-        found = replace(found, centre=(low + high) / 2)
+        found = replace(found, centre=((low + high) / 2)[: len(found)])
     return found
 
 
@@ -261,17 +278,21 @@ def _table(world: World) -> ObjectTable:
     names = _names(world)
     low, high = boxes_with_doors(world)
     flags = np.concatenate([world.properties, world.states[:, _STATE_COLUMNS]], axis=1).T.copy()
-    parents, size = tuple(world.parents), high - low
+    parents, size, contents = tuple(world.parents), high - low, world.contents
+    count = len(names.ids)
+    if count < len(world):
+        flags, size = flags[:, :count].copy(), size[:count]
+        parents, contents = parents[:count], contents[:count]
     all_but_centre = (names.ids, flags.tobytes(), size.tobytes(), parents, world.held)
     return ObjectTable(
         ids=names.ids,
         row=names.row,
         kinds=names.kinds,
         has=dict(zip((*PROPERTIES, *_STATES), flags, strict=True)),
-        centre=(low + high) / 2,
+        centre=((low + high) / 2)[:count],
         size=size,
         parents=parents,
-        contents=world.contents,
+        contents=contents,
         controlled=names.controlled,
         held=world.held,
         derived=get_or_compute(_derived, all_but_centre, _DERIVED_KEPT, dict),

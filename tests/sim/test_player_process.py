@@ -280,13 +280,11 @@ def test_a_refusal_is_falsy_or_raises(played):
 
 
 @pytest.mark.parametrize("make", [launch, EmbeddedController])
-def test_a_procedural_house_is_refused_with_a_reason(make):
+def test_a_house_that_cannot_be_built_is_refused_with_a_reason(make):
     with make(scene="FloorPlan1", headless=True) as controller:
-        with pytest.raises(ValueError, match="no procedural houses"):
-            controller.reset({"rooms": []})
-        assert controller.last_event.metadata["errorCode"] == "InvalidAction"
-        with pytest.raises(ValueError, match="Procedural"):
-            controller.reset("Procedural")
+        event = controller.reset({"rooms": []})
+        assert "the house has no rooms" in event.metadata["errorMessage"]
+        assert event.metadata["sceneName"] == "Procedural"
 
 
 # -- beginnings and ends ---------------------------------------------------------------------------

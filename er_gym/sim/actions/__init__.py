@@ -4,6 +4,7 @@ from er_gym.sim.actions import (  # noqa: F401  (imported for their registration
     arrange_objects,
     cameras,
     hand,
+    houses,
     initialize,
     lines,
     looks,

@@ -16,7 +16,7 @@ from er_gym.sim.actions.checks import within
 from er_gym.sim.actions.registry import action, quoted
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.look import FINISHES, OWN, SPLITS, Chance
-from er_gym.sim.scene import SCENE_NUMBERS
+from er_gym.sim.scene import scene_category
 from er_gym.sim.world import World
 
 _ROOM_TYPES = {
@@ -59,11 +59,9 @@ def randomize_materials(
     in a scene for training. Of each kind of room, 20 are for training, 5 for validation and 5 for
     testing. ``inRoomTypes`` is checked and has no effect: every set suits every room.
     """
-    number = int(world.scene.name.removeprefix("FloorPlan"))
     if inRoomTypes is not None:
-        _check_room_types(number, inRoomTypes)
-    place = number % 100
-    own = 0 if place <= _LAST_OF_TRAINING else 1 if place <= _LAST_OF_VALIDATION else 2
+        _check_room_types(world.scene.name, inRoomTypes)
+    own = _own_split(world)
     given = (useTrainMaterials, useValMaterials, useTestMaterials, useExternalMaterials)
     if given[own] is False:
         kind = SPLITS[own]
@@ -86,7 +84,15 @@ def randomize_materials(
     }
 
 
-def _check_room_types(number: int, given: list[str]) -> None:
+def _own_split(world: World) -> int:
+    """The number of the split that the scene belongs to; a house is for training."""
+    if world.scene.shell is not None:
+        return 0
+    place = int(world.scene.name.removeprefix("FloorPlan")) % 100
+    return 0 if place <= _LAST_OF_TRAINING else 1 if place <= _LAST_OF_VALIDATION else 2
+
+
+def _check_room_types(scene_name: str, given: list[str]) -> None:
     if not given:
         raise ActionFailed("inRoomTypes must have a non-zero length!")
     for name in given:
@@ -95,7 +101,7 @@ def _check_room_types(number: int, given: list[str]) -> None:
                 f"inRoomTypes contains unknown room type: {quoted(name)}. Valid room types are "
                 "Bedroom, Bathroom, LivingRoom, Kitchen and RoboTHOR."
             )
-    here = next(kind for name, kind in _ROOM_TYPES.items() if number in SCENE_NUMBERS[name])
+    here = _ROOM_TYPES[scene_category(scene_name)]
     if here not in map(str.lower, given):
         raise ActionFailed(f"inRoomTypes must include {here!r} inside of a {here} scene.")
 

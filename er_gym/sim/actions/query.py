@@ -43,7 +43,7 @@ def advance_physics_step(
 @action("GetScenesInBuild")
 def get_scenes_in_build(world: World) -> list[str]:
     """The names of the scenes, as the Unity build spells them."""
-    return [f"{name}_physics" for name in SCENE_NAMES]
+    return [*(f"{name}_physics" for name in SCENE_NAMES), "Procedural"]
 
 
 def _grid(world: World, step: float | None, ahead: bool = False) -> np.ndarray:

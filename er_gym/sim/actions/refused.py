@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 _BY_REASON = {
-    "it has the recorded iTHOR rooms and no procedural houses; backend='unity' has": (
-        "CreateHouse GetHouseFromTemplate DestroyHouse BakeNavMesh ReBakeNavMeshes "
+    "houses come from CreateHouse alone, and the engine finds their floors itself": (
+        "GetHouseFromTemplate DestroyHouse BakeNavMesh ReBakeNavMeshes "
         "OverwriteNavMeshes GetNavMeshConfigs CreateNewNavMesh SetSkybox CreateSkybox"
     ),
     "it has no database of assets to make objects from; backend='unity' has": (

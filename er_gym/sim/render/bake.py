@@ -67,11 +67,14 @@ class Bake:
 
 @lru_cache(maxsize=_BAKES)
 def bake_of(scene_name: str) -> Bake:
-    """The bake of a scene, out of the user's cache if it is there."""
+    """The bake of a scene, out of the user's cache if it is there; houses are not kept there."""
+    scene = load_scene(scene_name)
+    if scene.shell is not None:
+        return _without_added(_made(scene_name), scene.types)
     data = blake2b(scene_file(scene_name).read_bytes(), digest_size=8).hexdigest()
     name = f"{scene_name}-{data}.bake"
     bake = _read(kept("render", source_key(), name, lambda: _written(_made(scene_name))))
-    return _without_added(bake, load_scene(scene_name).types)
+    return _without_added(bake, scene.types)
 
 
 def look_of(seen: Appearance, heading: float) -> str:

@@ -40,8 +40,13 @@ class Doorway:
 
 
 def doorway(scene_name: str) -> Doorway | None:
-    """The door's place: a free stretch of wall near a light switch that the agent can walk to."""
+    """The door's place: a free stretch of wall near a light switch that the agent can walk to.
+
+    None in a house, whose doors are objects.
+    """
     scene, plan = load_scene(scene_name), floor_plan(scene_name)
+    if scene.shell is not None:
+        return None
     if plan.ceiling - plan.ground < HEIGHT + 0.05:
         return None
     switches = np.array(

@@ -11,7 +11,7 @@ Points are (x, z), metres, AI2-THOR's frame.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.scene import Scene, load_scene, scene_category
+from er_gym.sim.shell import Opening, Room, Shell
 from er_gym.sim.space.room_bounds import room_bounds
 
 Floats = NDArray[np.float64]
@@ -47,6 +48,8 @@ _HIDDEN = 0.34
 """Share of such an object that a wall may hide."""
 _CEILING = 0.1
 """Distance from the top of the scene's bounds down to the ceiling, metres."""
+_THROUGH = 0.03
+"""How far a hole in a wall of a house reaches to each side of the wall, metres."""
 _STOREY = 2.4
 """The least height of a room, metres."""
 _HANGERS = frozenset(
@@ -120,8 +123,10 @@ class FloorPlan:
 
 @lru_cache(maxsize=128)
 def floor_plan(scene_name: str) -> FloorPlan:
-    """The floor plan of a recorded scene."""
+    """The floor plan of a scene; of a house, that of all its rooms together."""
     scene = load_scene(scene_name)
+    if scene.shell is not None:
+        return plan_of_rooms(scene.shell.rooms, scene.shell)
     half = scene.aabb_size / 2
     low, high = scene.aabb_center - half, scene.aabb_center + half
     floor = scene.types.index("Floor")
@@ -138,6 +143,32 @@ def floor_plan(scene_name: str) -> FloorPlan:
         ground=float(high[floor, 1]),
         ceiling=float(max(room_bounds(scene_name)[1][1] - _CEILING, high[floor, 1] + _STOREY)),
     )
+
+
+def plan_of_rooms(rooms: Sequence[Room], shell: Shell) -> FloorPlan:
+    """The plan of some rooms of a house: its walls are those around them, not between them."""
+    corners = np.array([corner for room in rooms for corner in room.polygon])
+    xs, zs = (np.unique(corners[:, axis].round(4)) for axis in (0, 1))
+    x, z = (xs[1:] + xs[:-1]) / 2, (zs[1:] + zs[:-1]) / 2
+    inside = np.any([room.contains(x[:, None], z) for room in rooms], axis=0)
+    return FloorPlan(
+        xs=xs,
+        zs=zs,
+        inside=inside,
+        walls=tuple(_walls(xs, zs, inside)),
+        holes=tuple(_hole(opening) for opening in shell.openings),
+        ground=shell.ground,
+        ceiling=shell.ceiling,
+    )
+
+
+def _hole(opening: Opening) -> tuple[Floats, Floats]:
+    low, high = np.zeros(3), np.zeros(3)
+    across, along = 2 * opening.axis, 2 - 2 * opening.axis
+    low[across], high[across] = opening.at - _THROUGH, opening.at + _THROUGH
+    low[along], high[along] = opening.span
+    low[1], high[1] = opening.heights
+    return low, high
 
 
 @dataclass(frozen=True, eq=False)

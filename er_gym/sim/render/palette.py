@@ -92,22 +92,23 @@ def mixed(one: Colour, other: Colour, share: float) -> Colour:
     return r, g, b
 
 
-def flooring(scene: str) -> tuple[str, float]:
-    """The floor of a recorded scene: its material, and the metres of one repeat of its texture."""
-    material, _ = _floor(scene)
+def flooring(scene: str, kind: str | None = None) -> tuple[str, float]:
+    """The floor of a scene, or of a room of a kind: its material, and the metres of one repeat of
+    its texture."""
+    material, _ = _floor(scene, kind or scene_category(scene))
     return material, _FLOOR_TURNS[material]
 
 
-def _floor(scene: str) -> tuple[str, Colour]:
-    floors = _FLOORS[scene_category(scene)]
+def _floor(scene: str, kind: str) -> tuple[str, Colour]:
+    floors = _FLOORS[kind]
     return floors[blake2b(f"{scene} floor".encode(), digest_size=8).digest()[0] % len(floors)]
 
 
 @lru_cache(maxsize=128)
-def palette(scene: str) -> Palette:
-    """The colours of a recorded scene."""
+def palette(scene: str, kind: str | None = None) -> Palette:
+    """The colours of a scene, or of a room of a kind, which need be no scene."""
     seed = int.from_bytes(blake2b(scene.encode(), digest_size=8).digest(), "big")
-    random, kind = np.random.default_rng(seed), scene_category(scene)
+    random, kind = np.random.default_rng(seed), kind or scene_category(scene)
 
     def one(colours: tuple[Colour, ...]) -> Colour:
         return colours[int(random.integers(len(colours)))]
@@ -120,5 +121,5 @@ def palette(scene: str) -> Palette:
         accent=one(_ACCENTS),
         metal=one(_METALS),
         wall=one(_WALLS[kind]),
-        floor=_floor(scene)[1],
+        floor=_floor(scene, kind)[1],
     )

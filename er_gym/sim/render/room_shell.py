@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.render.doorway import WIDTH, Doorway, door, doorway
-from er_gym.sim.render.floor_plan import Floats, FloorPlan, Wall, floor_plan
+from er_gym.sim.render.floor_plan import Floats, FloorPlan, Wall
 from er_gym.sim.render.lighting import light
 from er_gym.sim.render.mesh import Mesh
-from er_gym.sim.render.palette import Palette, flooring, mixed, palette, shaded
-from er_gym.sim.render.patch import Colour, Patch
-from er_gym.sim.scene import scene_category
+from er_gym.sim.render.palette import Palette, mixed, shaded
+from er_gym.sim.render.patch import Colour, Patch, merged
+from er_gym.sim.render.room_plans import RoomPlan, room_plans
 
 _CEILING: Colour = (0.97, 0.97, 0.95)
 _SKIRTING: Colour = (0.93, 0.92, 0.89)
@@ -64,16 +64,31 @@ class _Band:
 
 @lru_cache(maxsize=128)
 def room_shell(scene_name: str) -> RoomShell:
-    """The shell of a recorded scene."""
-    plan, colours = floor_plan(scene_name), palette(scene_name)
+    """The shell of a scene: of a house, the shells of its rooms."""
+    shells = [_of_room(scene_name, room) for room in room_plans(scene_name)]
+    if len(shells) == 1:
+        return shells[0]
+    return RoomShell(
+        _together([each.floor for each in shells]), _together([each.rest for each in shells])
+    )
+
+
+def _together(rooms: list[dict[str, Patch]]) -> dict[str, Patch]:
+    """The patches of several rooms, by material."""
+    materials = dict.fromkeys(material for room in rooms for material in room)
+    return {name: merged([room[name] for room in rooms if name in room]) for name in materials}
+
+
+def _of_room(scene_name: str, room: RoomPlan) -> RoomShell:
+    plan, colours = room.plan, room.colours
     floor, rest = Mesh(), Mesh()
-    material, turns = flooring(scene_name)
+    material, turns = room.flooring
     _level(floor, plan, plan.ground, 1.0, colours.floor, material, turns)
     _level(rest, plan, plan.ceiling, -1.0, _CEILING, "plain", 2.0)
     entry = doorway(scene_name)
     for wall in plan.walls:
         holes = tuple(_holes(plan, wall))
-        for band in _bands(scene_category(scene_name), colours, plan.ceiling - plan.ground):
+        for band in _bands(room.category, colours, plan.ceiling - plan.ground):
             _upright(rest, plan, wall, band, holes)
         for hole in holes:
             _reveal(rest, wall, hole, mixed(colours.wall, (1.0, 1.0, 1.0), 0.5))

@@ -139,7 +139,8 @@ class SceneGraph:
                 self._remove(i)
                 continue
             if world.types[i] in UNSEEN:
-                self._lay_floor(i)
+                if world.types[i] == "Floor":
+                    self._lay_floor(i)
                 continue
             if i in recorded and i not in world.touched:
                 self._place_as_recorded(i, world.types[i])

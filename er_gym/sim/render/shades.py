@@ -33,6 +33,7 @@ _NONE = frozenset(
         "HandTowelHolder", "LightSwitch", "Mirror", "Painting", "Poster", "Shelf", "ShowerCurtain",
         "ShowerDoor", "ShowerGlass", "ShowerHead", "Sink", "SinkBasin", "StoveBurner", "StoveKnob",
         "ToiletPaperHanger", "Towel", "TowelHolder", "Window", "BathtubBasin", "CounterTop",
+        "Doorway", "Doorframe", "Wall",
     }
 )  # fmt: skip
 """Types that hang on something or are built into it."""

@@ -18,6 +18,7 @@ from er_gym.sim.render.materials import MATERIALS
 from er_gym.sim.render.pieces import Piece
 from er_gym.sim.render.place import Place, in_room
 from er_gym.sim.scene import load_scene
+from er_gym.sim.shell import Shell
 from er_gym.sim.space.solids import solid_of
 from er_gym.sim.world import World
 
@@ -30,6 +31,8 @@ _NEAR = 1.2
 """Square metres that are added to squared distances, since windows are no points."""
 _WRAP = 0.35
 """How far beyond its edge a surface is still lit, as a cosine."""
+_INTO = 0.3
+"""Distance from a window to a point in its room, metres."""
 _LEAST, _MOST = 0.55, 1.4
 _WHITE = 248.0
 """The lightest colour. The software rasteriser computes colours a little beyond a triangle's edge,
@@ -80,7 +83,9 @@ def daylight(scene_name: str, shell: Sequence[Piece]) -> Daylight:
             centre, size = scene.aabb_center[i], scene.aabb_size[i]
             axis = 0 if size[0] < size[2] else 2
             out = np.zeros(3)
-            out[axis] = np.sign(middle[axis] - centre[axis]) or 1.0
+            out[axis] = _inward(scene.shell, centre, axis) or (
+                np.sign(middle[axis] - centre[axis]) or 1.0
+            )
             at.append(centre)
             into.append(out)
             areas.append(float(size[2 - axis] * size[1]))
@@ -91,6 +96,16 @@ def daylight(scene_name: str, shell: Sequence[Piece]) -> Daylight:
     light = Daylight(_single(at), _single(into), _single(areas))
     levels = [_level(light, *in_room(piece, Place())) for piece in shell]
     return replace(light, even=1.0 / float(np.concatenate(levels).mean()))
+
+
+def _inward(shell: Shell | None, centre: NDArray[np.float64], axis: int) -> float:
+    """1 or -1, the direction along an axis in which a house's room lies; 0 if that is not known."""
+    if shell is None:
+        return 0.0
+    points = np.repeat(centre[None], 2, axis=0)
+    points[:, axis] += (-_INTO, _INTO)
+    below, above = np.any([room.contains(*points.T[::2]) for room in shell.rooms], axis=0).tolist()
+    return float(above) - float(below)
 
 
 def lamps_on(world: World) -> tuple[Lamp, ...]:

@@ -53,8 +53,8 @@ class Footprints:
             for solid in (solid_of(world, i),)
             for part in _obstructing_parts(kind, solid)
         ]
-        boxes = np.array([part for _, part in parts])
-        centres = np.array([solid.middle for solid, _ in parts])
+        boxes = np.array([part for _, part in parts]).reshape(-1, 2, 3)
+        centres = np.array([solid.middle for solid, _ in parts]).reshape(-1, 3)
         yaw = np.radians([solid.yaw for solid, _ in parts])
         cos, sin = np.cos(yaw), np.sin(yaw)
         x, z = ((boxes[:, 0] + boxes[:, 1]) / 2)[:, [0, 2]].T

@@ -54,7 +54,11 @@ def room_corners(scene_name: str) -> tuple[tuple[float, ...], tuple[float, ...]]
 def estimate_bounds(
     scene: Scene, slacks: Slacks
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The same with other slacks; not cached."""
+    """The same with other slacks; not cached. Those of a house are known."""
+    if scene.shell is not None:
+        (west, south), (east, north) = scene.shell.bounds
+        low = (west, scene.shell.ground - _UNDER_FLOOR, south)
+        return np.array(low), np.array((east, scene.shell.ceiling, north))
     half = scene.aabb_size / 2
     # The lower corner with its sign turned, then the upper one: both grow outwards.
     ends = np.stack([half - scene.aabb_center, half + scene.aabb_center])

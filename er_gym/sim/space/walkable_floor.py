@@ -157,7 +157,10 @@ def connected(seeds: Bitmap, on: Bitmap) -> Bitmap:
 
 @lru_cache(maxsize=128)
 def floor_of(scene_name: str) -> Floor:
-    """The floor of a recorded scene, before anything is moved or opened."""
+    """The floor of a scene, before anything is moved or opened."""
+    shell = load_scene(scene_name).shell
+    if shell is not None:
+        return Floor(shell.origin, shell.free, shell.free, shell.free)
     return compute_floor(scene_name, Rules())
 
 

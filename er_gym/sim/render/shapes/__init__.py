@@ -12,6 +12,7 @@ from er_gym.sim.render.shapes import (  # noqa: F401  (each registers its shapes
     cleaning,
     cutlery,
     decor,
+    doors,
     electronics,
     food,
     hangings,

@@ -17,7 +17,7 @@ from er_gym.sim.render.patch import Patch
 Shape = Callable[[Appearance], Mesh]
 SHAPES: dict[str, Shape] = {}
 """The shape of each object type."""
-UNSEEN = frozenset({"Floor"})
+UNSEEN = frozenset({"Floor", "Wall"})
 """Types that are drawn with the room and not as objects."""
 _KEPT = 256
 _OWN = __name__.rpartition(".")[0]

@@ -21,6 +21,8 @@ _OPENS = 0.35
 """The counter ends at this distance in front of a front, metres."""
 _IN_LINE, _GAP = 0.06, 0.8
 """How far apart cabinets of one row may be, ahead and to the side, metres."""
+_ARM = 0.65
+"""Depth of the arms of a counter of a house, metres."""
 _NARROW = 0.15
 """Narrower strips of a counter are dropped, metres."""
 
@@ -37,6 +39,8 @@ def rectangles(scene_name: str, i: int) -> NDArray[np.float64]:
     scene = load_scene(scene_name)
     low = (scene.aabb_center[i] - scene.aabb_size[i] / 2)[[0, 2]]
     high = low + scene.aabb_size[i][[0, 2]]
+    if scene.shell is not None:
+        return _arms(scene.asset_ids[i], low, high, round(float(scene.rotation[i, 1]) / 90.0) % 4)
     first, left = _not_swept(scene_name, low, high)
     for k, kind in enumerate(scene.types):
         if kind in _NEIGHBOURS:
@@ -61,6 +65,31 @@ def rectangles(scene_name: str, i: int) -> NDArray[np.float64]:
     boxes = np.array(found or [np.array([low, high])])
     boxes.setflags(write=False)
     return boxes
+
+
+def _arms(
+    asset: str, low: NDArray[np.float64], high: NDArray[np.float64], quarters: int
+) -> NDArray[np.float64]:
+    """(R, 2, 2) the arms of a counter of a house, which the name of its asset tells.
+
+    One runs along the back. An L has one on its right, and a C on both sides.
+    """
+    shape = next((name for name in ("_L_", "_C_") if name in asset), "")
+    sides = {"": (), "_L_": (1,), "_C_": (1, 3)}[shape]  # quarter turns from the front
+    found = [_strip(low, high, (quarters + side) % 4) for side in (2, *sides)] if shape else []
+    boxes = np.array(found or [np.array([low, high])])
+    boxes.setflags(write=False)
+    return boxes
+
+
+def _strip(low: NDArray[np.float64], high: NDArray[np.float64], side: int) -> NDArray[np.float64]:
+    """(2, 2) the strip along one side of a rectangle: 0 is +z, 1 is +x."""
+    corners, axis = np.array([low, high]), (side + 1) % 2
+    if side < 2:
+        corners[0, axis] = max(low[axis], high[axis] - _ARM)
+    else:
+        corners[1, axis] = min(high[axis], low[axis] + _ARM)
+    return corners
 
 
 def _before_fronts(

@@ -35,6 +35,9 @@ def facings(scene_name: str) -> NDArray[np.float64]:
     """(N,) recorded heading of each object's front, degrees; quarter turns for fixed objects."""
     scene = load_scene(scene_name)
     found = scene.rotation[:, 1].copy()
+    if scene.shell is not None:  # its parts have the heading of what they are part of
+        found.setflags(write=False)
+        return found
     for i in np.flatnonzero(np.isnan(scene.obb[:, 0, 0])).tolist():
         quarters = round(scene.rotation[i, 1] / 90.0) % 4
         if scene.types[i] in _BY_THE_ROOM:

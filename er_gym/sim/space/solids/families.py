@@ -161,6 +161,12 @@ def lamp(w: float, h: float, d: float, s: float) -> Parts:
     ]
 
 
+def door_frame(w: float, h: float, d: float, s: float) -> Parts:
+    """Two jambs and a lintel."""
+    sides = [((x, 0.0, 0.0), (x + _BOARD, h, d)) for x in (0.0, w - _BOARD)]
+    return [*sides, ((0.0, h - _BOARD, 0.0), (w, h, d))]
+
+
 def nothing(w: float, h: float, d: float, s: float) -> Parts:
     """No part at all."""
     return []
@@ -218,6 +224,7 @@ _BY_TYPES = {
     "Floor Window Curtains Blinds Painting Poster Mirror LightSwitch ShowerGlass ShowerDoor "
     "ShowerHead StoveBurner StoveKnob Faucet TowelHolder HandTowelHolder ToiletPaperHanger "
     "RoomDecor": _SEE_THROUGH,
+    "Doorway Doorframe": Family(door_frame, nothing),
     "SinkBasin BathtubBasin": Family(hides=nothing, stand=None),
 }
 _FAMILIES = {name: family for names, family in _BY_TYPES.items() for name in names.split()}

@@ -19,7 +19,7 @@ from er_gym.sim.space.solids.surface_points import (
     surface_fractions,
 )
 
-SEEN_FROM_OUTSIDE = ("Drawer", "Cabinet", "CounterTop", "StoveBurner")
+SEEN_FROM_OUTSIDE = ("Drawer", "Cabinet", "CounterTop", "StoveBurner", "Wall")
 """Types that are seen only from outside: their own boxes hide the points on their far sides."""
 SLABS = (
     "CounterTop", "Desk", "CoffeeTable", "SideTable", "DiningTable", "Dresser", "TVStand", "Sofa",
@@ -66,6 +66,8 @@ def sample_points(world: SceneObjects, i: int) -> Floats:
     kind = world.types[i]
     if kind == "Floor":
         return points_on_top(np.array([world.low[i], world.high[i]]))
+    if kind == "Wall" and world.scene.shell is not None:
+        return np.concatenate([_both_sides(box) for box in world.scene.shell.walls[i]])
     if kind == "CounterTop" and i < len(world.scene):
         return np.concatenate([_slab(box) for box in carcass(world.scene.name, i).slab])
     if kind == "Drawer" or kind in _POINTS_FROM_OUTSIDE:
@@ -116,6 +118,12 @@ def _shelf(box: Floats, built_in: bool) -> Floats:
 
 
 _POINTS_FROM_OUTSIDE = {"Cabinet": _cabinet, "Shelf": _shelf}
+
+
+def _both_sides(box: Floats) -> Floats:
+    """Points on the two large sides of a piece of wall."""
+    axis = 0 if box[1, 0] - box[0, 0] < box[1, 2] - box[0, 2] else 2
+    return np.concatenate([points_on_face(box, axis, sign, _OUT, 2.0) for sign in (-1, 1)])
 
 
 def _slab(box: Floats, above: float = _OUT, out: float = _OUT) -> Floats:

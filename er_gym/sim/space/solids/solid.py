@@ -46,6 +46,10 @@ def solid_of(world: SceneObjects, i: int) -> Solid:
     """The solid of object i at its present place."""
     if world.types[i] == "CounterTop" and i < len(world.scene):
         return _counter(world, i)
+    walls = {} if world.scene.shell is None else world.scene.shell.walls
+    if i in walls:
+        middle = (world.low[i] + world.high[i]) / 2
+        return Solid(middle, 0.0, walls[i] - middle, walls[i], walls[i])
     if world.types[i] == "StoveBurner" and i == next(world.of_type("StoveBurner")):
         return _with_stove(world, i)
     return _of_family(world, i)
