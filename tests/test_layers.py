@@ -22,7 +22,7 @@ _BASE = {
     "er_gym.version",
     "er_gym.writing",
 }
-_TASKS = {*_BASE, "er_gym.thor", "er_gym.tasks"}
+_TASKS = {*_BASE, "er_gym.houses", "er_gym.thor", "er_gym.tasks"}
 _ENVS = {*_TASKS, "er_gym.envs"}
 _ROLLOUT = {*_ENVS, "er_gym.resumable", "er_gym.rollout"}
 _DATA = {*_ROLLOUT, "er_gym", "er_gym.data"}
@@ -74,6 +74,7 @@ ALLOWED = {
     "er_gym.shared_library": {"er_gym.writing"},
     "er_gym.locking": _BASE,
     "er_gym.sim": {*_BASE, "er_gym.sim"},
+    "er_gym.houses": {*_BASE, "er_gym.sim", "er_gym.houses"},
     "er_gym.thor": {*_BASE, "er_gym.sim", "er_gym.thor"},
     "er_gym.tasks": _TASKS,
     "er_gym.envs": _ENVS,

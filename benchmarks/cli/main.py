@@ -28,6 +28,7 @@ from benchmarks.cli.errors import (
     print_problem,
 )
 from benchmarks.cli.finetune import finetune
+from benchmarks.cli.houses import houses
 from benchmarks.cli.inspect import inspect
 from benchmarks.cli.leaderboard import leaderboard, submit
 from benchmarks.cli.new_model import new_model
@@ -121,6 +122,7 @@ cli.add_command(render)
 cli.add_command(play)
 cli.add_command(replay)
 cli.add_command(tasks)
+cli.add_command(houses)
 cli.add_command(train_rl)
 cli.add_command(finetune)
 cli.add_command(reinforce)

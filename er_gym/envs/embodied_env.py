@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import threading
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -29,6 +30,7 @@ from er_gym.envs.reset_options import checked_options
 from er_gym.envs.saved_episode import BROKEN_OFF, SavedEpisode
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.envs.window import Window
+from er_gym.houses.names import is_house, named, scene_of
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import types_named
 from er_gym.thor import BACKENDS, LIGHTS, RENDER_DEVICES, check_size, make_controller
@@ -268,6 +270,9 @@ class EmbodiedEnv(SavedEpisode, gymnasium.Env[dict[str, Any], Any]):
     ) -> ResetResult:
         """Begin an episode; ``options`` may pin its ``task``, ``scene`` or ``suite``.
 
+        The scene may be a house: a name such as ``House3-17``, or a dictionary in ProcTHOR's JSON.
+        If there are no tasks for it, one is generated.
+
         Raises:
             ValueError: an option does not fit, or there is no such task. The episode under way goes
                 on.
@@ -418,7 +423,7 @@ class EmbodiedEnv(SavedEpisode, gymnasium.Env[dict[str, Any], Any]):
     def _started_controller(self, scene: str) -> Any:
         if self._controller is None:
             self._controller = make_controller(
-                self._backend, scene=scene, **self._controller_arguments
+                self._backend, scene=scene_of(scene), **self._controller_arguments
             )
         return self._controller
 
@@ -433,15 +438,21 @@ class EmbodiedEnv(SavedEpisode, gymnasium.Env[dict[str, Any], Any]):
     def _choose(
         self,
         task: Task | str | None = None,
-        scene: str | None = None,
+        scene: str | Mapping[str, Any] | None = None,
         suite: Source | None = None,
     ) -> Task:
+        if isinstance(scene, Mapping):
+            scene = named(scene)
         source = self._source
         if suite is not None:
             source = self._resolve_source(suite)
         elif self._generates and self._generator is None:  # close() has closed it
             source = self._source = self._resolve_source(GENERATE)
         if task is None:
+            if suite is None and scene is not None and is_house(scene):
+                with suppress(ValueError):  # it has no tasks there
+                    return self._draw(source, scene)
+                source = self._resolve_source(GENERATE)
             return self._draw(source, scene)
         wanted = source.find(task) if isinstance(task, str) else task
         if scene not in (None, wanted.scene):

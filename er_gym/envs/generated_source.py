@@ -9,6 +9,7 @@ import numpy as np
 
 from er_gym.envs.arguments import short_repr
 from er_gym.envs.verify import PlayableEnv, Verifier, rejection_reason, with_difficulty
+from er_gym.houses.names import is_house
 from er_gym.tasks.generate import Generator, generated_types, generator_for
 from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import Task
@@ -52,14 +53,18 @@ class GeneratedSource:
 
     def draw(self, rng: np.random.Generator, task_type: TaskType | None, scene: str | None) -> Task:
         """Draw a task that the solver has just solved."""
-        if scene and scene not in SCENE_NAMES:
-            raise ValueError(f"unknown scene {short_repr(scene)}; give a name such as FloorPlan1")
+        house = bool(scene) and is_house(str(scene))
+        if scene and scene not in SCENE_NAMES and not house:
+            raise ValueError(
+                f"unknown scene {short_repr(scene)}; give a name such as FloorPlan1 or House3-17"
+            )
         kinds = [task_type] if task_type else self._kinds
         rooms = (scene,) if scene else self._spec.rooms
         for _ in range(_ROOMS):
             kind = kinds[int(rng.integers(len(kinds)))]
             name = rooms[int(rng.integers(len(rooms)))]
-            room = self._room(name, int(rng.integers(self._spec.layouts + 1)))
+            layout = int(rng.integers(self._spec.layouts + 1))
+            room = self._room(name, 0 if house else layout)
             tasks = [
                 task
                 for task in room.tasks([kind.name])

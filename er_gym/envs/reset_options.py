@@ -23,10 +23,10 @@ def checked_options(options: Any) -> Mapping[str, Any]:
     unknown = sorted(short_repr(name) for name in options if name not in ("task", "scene", "suite"))
     if unknown:
         raise ValueError(f"unknown option {unknown[0]} at reset; there are: task, scene, suite")
-    for name, kinds in (("task", Task | str), ("scene", str)):
+    for name, kinds in (("task", Task | str), ("scene", str | Mapping)):
         if not isinstance(options.get(name), kinds | None) or options.get(name) == "":
             raise ValueError(
                 f"option {name!r} at reset is {short_repr(options[name])}; give a "
-                f"{'Task or its id' if name == 'task' else 'scene such as FloorPlan1'}"
+                f"{'Task or its id' if name == 'task' else 'scene such as FloorPlan1, or a house'}"
             )
     return options

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from er_gym.houses.names import scene_of
+
 _DECIMALS = 4
 """Decimals of stored poses: a tenth of a millimetre, a ten-thousandth of a degree."""
 _SOMEWHERE_ELSE = 20
@@ -48,13 +50,13 @@ def set_up_scene(controller: Any, scene: str, arrangement: Arrangement) -> Any:
 
     Args:
         controller: an AI2-THOR controller.
-        scene: such as ``FloorPlan1``.
+        scene: such as ``FloorPlan1``, or the name of a house.
         arrangement: what to change.
 
     Raises:
         ValueError: an object of the arrangement is not in the scene.
     """
-    event = controller.reset(scene)
+    event = controller.reset(scene_of(scene))
     if arrangement.poses:
         poses = _all_poses(_recorded_poses(controller, scene, event), arrangement)
         del event  # the embedded engine need not compute an event that nobody keeps
@@ -122,12 +124,12 @@ def random_arrangement(controller: Any, scene: str, seed: int) -> Arrangement:
         scene: such as ``FloorPlan1``.
         seed: the same seed gives the same arrangement.
     """
-    objects = controller.reset(scene).metadata["objects"]
+    objects = controller.reset(scene_of(scene)).metadata["objects"]
     recorded = {entry["name"]: _pose(entry) for entry in objects}
     best, fewest = Arrangement(), float("inf")
     for attempt in range(_ATTEMPTS):
         if attempt:
-            controller.reset(scene)
+            controller.reset(scene_of(scene))
         spawned = controller.step(
             action="InitialRandomSpawn",
             randomSeed=seed * _ATTEMPTS + attempt,

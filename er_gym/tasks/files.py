@@ -73,7 +73,8 @@ def known_scene(name: str, where: str) -> str:
     except ValueError:
         raise TaskFileError(
             f"{where} has unknown scene {name!r}; "
-            "choose one of FloorPlan1-30, FloorPlan201-230, FloorPlan301-330, FloorPlan401-430"
+            "choose one of FloorPlan1-30, FloorPlan201-230, FloorPlan301-330, FloorPlan401-430, "
+            "or a house such as House3-17"
         ) from None
     return name
 

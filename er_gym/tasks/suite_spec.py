@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from er_gym.houses.names import is_house
 from er_gym.tasks.difficulty import Difficulty
 from er_gym.tasks.splits import SCENES
 from er_gym.tasks.types import canonical_names
@@ -59,11 +60,11 @@ class SuiteSpec(BaseModel):
     def _known_scenes(cls, scenes: str | tuple[str, ...]) -> str | tuple[str, ...]:
         names = () if isinstance(scenes, str) and scenes in SCENES else scenes
         names = (names,) if isinstance(names, str) else names
-        unknown = [name for name in names if name not in SCENE_NAMES]
+        unknown = [name for name in names if name not in SCENE_NAMES and not is_house(name)]
         if unknown or not scenes:
             raise ValueError(
                 f"unknown scene {''.join(unknown[:1])!r}; "
-                f"give names such as FloorPlan1, or one of: {', '.join(SCENES)}"
+                f"give names such as FloorPlan1 or House3-17, or one of: {', '.join(SCENES)}"
             )
         return scenes
 

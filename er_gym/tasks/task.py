@@ -12,7 +12,7 @@ from er_gym.tasks.arrangement import Arrangement
 from er_gym.tasks.goal import Condition
 from er_gym.tasks.types import TaskType
 
-_COORDINATE = re.compile(r"[+-]?\d+\.\d+")
+_NUMBER = re.compile(r"[+-]?\d+(\.\d+)?")
 
 
 def type_of_id(object_id: str) -> str:
@@ -20,19 +20,22 @@ def type_of_id(object_id: str) -> str:
 
     The id of a part ends in the part's type, after the coordinates of the whole object:
     ``Sink|-01.90|+00.97|-01.50|SinkBasin`` is a SinkBasin, ``Apple|…|AppleSliced_2`` an
-    AppleSliced.
+    AppleSliced. Houses have numbers in place of coordinates: ``Apple|surface|2|0``.
     """
     if not object_id:
         return ""
     last = object_id.rsplit("|", 1)[-1]
-    if _COORDINATE.fullmatch(last):
+    if _NUMBER.fullmatch(last):
         return object_id.split("|", 1)[0]
     return re.sub(r"_\d+$", "", last)
 
 
 def whole_id(object_id: str) -> str:
-    """The id of the whole object: its type and three coordinates, without the name of a part."""
-    return "|".join(object_id.split("|")[:4])
+    """The id of the whole object: its type and its numbers, without the name of a part."""
+    fields = object_id.split("|")
+    while len(fields) > 2 and not _NUMBER.fullmatch(fields[-1]):
+        fields.pop()
+    return "|".join(fields)
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,7 @@ class Task:
     Attributes:
         id: unique in its suite and usable as a file name.
         type: the row of :data:`er_gym.tasks.types.TASK_TYPES`.
-        scene: an iTHOR scene name, ``FloorPlan1`` and so on.
+        scene: an iTHOR scene name, ``FloorPlan1`` and so on, or the name of a house.
         instruction: the text for the agent.
         key_actions: in the order in which an expert does them.
         name: the instruction before paraphrase (the paper's ``taskname``; its scorer reads it).

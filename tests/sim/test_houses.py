@@ -65,7 +65,7 @@ def test_its_objects_are_those_of_the_file_with_the_parts_of_their_assets(fresh)
     assert kinds["wall|1|2"] == "Wall"
     drawers = [i for i, kind in kinds.items() if kind == "Drawer"]
     assert len(drawers) == 8
-    assert all(i.startswith("Dresser|2|1___") for i in drawers)
+    assert all(i.startswith("Dresser|2|1|Drawer_") for i in drawers)
     assert entry(fresh, APPLE)["parentReceptacles"] == ["CounterTop|1|0"]
     assert entry(fresh, APPLE)["assetId"] == "Apple_27"
     assert entry(fresh, MUG)["isDirty"]

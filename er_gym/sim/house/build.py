@@ -227,7 +227,7 @@ def _parents(
         lies_in = receptacles_of(world, i)
         named = index.get(row.parent) if row.parent else None
         if named is not None and named not in lies_in:
-            inner = [r for r in lies_in if rows[r].id.startswith(f"{row.parent}___")]
+            inner = [r for r in lies_in if rows[r].id.startswith(f"{row.parent}|")]
             lies_in = (*inner, named)
         world.parents[i] = lies_in
         found.append(lies_in)

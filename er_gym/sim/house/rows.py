@@ -127,7 +127,7 @@ def _parts(
     matrix = unity_rotation(turn)
     for k, part in enumerate(parts):
         yield Row(
-            f"{each.id}___{k}",
+            f"{each.id}|{part.type}_{k}",
             part.type,
             middle + matrix @ np.array(part.middle),
             np.array(part.size),

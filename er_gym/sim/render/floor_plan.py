@@ -48,6 +48,8 @@ _HIDDEN = 0.34
 """Share of such an object that a wall may hide."""
 _CEILING = 0.1
 """Distance from the top of the scene's bounds down to the ceiling, metres."""
+_THIN_SEAM = 0.002
+"""Of the walls of houses, which are as thin as paper, metres."""
 _THROUGH = 0.03
 """How far a hole in a wall of a house reaches to each side of the wall, metres."""
 _STOREY = 2.4
@@ -103,6 +105,7 @@ class FloorPlan:
         walls: the walls around it.
         holes: boxes ((3,), (3,)) of the windows, where walls are open.
         ground, ceiling: heights.
+        seam: how far walls reach behind those that they meet; less where another room lies there.
     """
 
     xs: Floats
@@ -112,6 +115,7 @@ class FloorPlan:
     holes: tuple[tuple[Floats, Floats], ...]
     ground: float
     ceiling: float
+    seam: float = 0.02
 
     def contains(self, point: Floats) -> bool:
         """Whether (x, z) is in the room."""
@@ -159,6 +163,7 @@ def plan_of_rooms(rooms: Sequence[Room], shell: Shell) -> FloorPlan:
         holes=tuple(_hole(opening) for opening in shell.openings),
         ground=shell.ground,
         ceiling=shell.ceiling,
+        seam=_THIN_SEAM,
     )
 
 

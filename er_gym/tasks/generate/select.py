@@ -104,4 +104,4 @@ def _words(task: Task) -> set[str]:
 
 
 def _scene_number(task: Task) -> int:
-    return int(task.scene.removeprefix("FloorPlan").removesuffix("_physics"))
+    return int("".join(filter(str.isdigit, task.scene)))

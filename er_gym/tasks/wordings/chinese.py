@@ -178,5 +178,8 @@ CHINESE = Grammar(
 )
 """The Chinese wordings."""
 
-ROOMS = {"kitchen": "厨房", "living room": "客厅", "bedroom": "卧室", "bathroom": "浴室"}
+ROOMS = {
+    "kitchen": "厨房", "living room": "客厅", "bedroom": "卧室", "bathroom": "浴室",
+    "house": "房子",
+}  # fmt: skip
 WAYS = {"on": "打开", "off": "关掉"}

@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Literal, get_args
 from zlib import crc32
 
-from er_gym.tasks.room_kinds import ROOM_KINDS, room_kind
+from er_gym.tasks.room_kinds import HOUSE, ROOM_KINDS, room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.wordings import chinese
 from er_gym.tasks.wordings.english import ENGLISH
@@ -24,7 +24,7 @@ Language = Literal["en", "zh"]
 LANGUAGES: tuple[str, ...] = get_args(Language)
 _GRAMMARS: Mapping[str, Grammar] = {"en": ENGLISH, "zh": chinese.CHINESE}
 _CHINESE = re.compile(r"[\u4e00-\u9fff]")
-_ROOM = re.compile("|".join((*ROOM_KINDS, *chinese.ROOMS.values())))
+_ROOM = re.compile("|".join((*ROOM_KINDS, rf"\b{HOUSE}\b", *chinese.ROOMS.values())))
 _CLAUSES = {
     kind: re.compile(pattern)
     for kind, pattern in {

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
 
-from er_gym.tasks.room_kinds import ROOM_KINDS
+from er_gym.tasks.room_kinds import HOUSE, ROOM_KINDS
 from er_gym.tasks.wordings.english import ENGLISH
 
 
@@ -63,7 +63,7 @@ IN_ORDER = "in order"
 _FIELDS: Mapping[str, str] = {
     "object": r"(?P<object>\w+)(?: that (?:is|are) (?P<object_in>in|on) the (?P<object_at>\w+))?",
     "place": r"(?P<place_in>in|on) the (?P<place>\w+)",
-    "room": f"(?P<room>{'|'.join(ROOM_KINDS)})",
+    "room": f"(?P<room>{'|'.join((*ROOM_KINDS, HOUSE))})",
     "way": r"(?P<way>on|off)",
 }
 _NEXT = re.compile(r"\. (?:Then|After that|Finally), ")
