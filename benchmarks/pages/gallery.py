@@ -1,5 +1,5 @@
 """docs/gallery.md and the README's picture: every type of thing with its name, rooms of each kind,
-and twelve rooms in both lights.
+twelve rooms in both lights, and ten houses.
 
     python -m benchmarks.pages.gallery [--kinds Fridge,Mug --states --out sheet.png]
 
@@ -22,6 +22,7 @@ from benchmarks.cli.errors import bad_input
 from benchmarks.cli.options import force_option
 from benchmarks.harness.output import ROOT
 from benchmarks.harness.samples import sheet
+from benchmarks.pages.houses import house_pages
 from er_gym.sim.actions import perform
 from er_gym.sim.agent import Agent
 from er_gym.sim.render.appearance import Appearance, compute_appearance
@@ -184,7 +185,9 @@ def make_gallery() -> None:
     """Write docs/gallery.md and its pictures, which are the repository's own."""
     images = DOCS / "images"
     things = [
-        (kind, portrait(looks(kind)[0])) for kind in track(sorted(SHAPES), "things", transient=True)
+        (kind, portrait(found[0]))
+        for kind in track(sorted(SHAPES), "things", transient=True)
+        if (found := looks(kind))  # the doors of houses are in no recorded room
     ]
     write_picture(images / "gallery-things.png", sheet(things, _COLUMNS), force=True, optimize=True)
     lines = [
@@ -219,6 +222,7 @@ def make_gallery() -> None:
     small = front.resize((1000, 625), Image.Resampling.LANCZOS)
     write_picture(images / "rooms.jpg", small, force=True, quality=88)
     lines += _light_pages(images)
+    lines += house_pages(images)
     write_output(DOCS / "gallery.md", MARKDOWN_MARK + "\n".join(lines), force=True)
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -48,8 +48,8 @@ _HIDDEN = 0.34
 """Share of such an object that a wall may hide."""
 _CEILING = 0.1
 """Distance from the top of the scene's bounds down to the ceiling, metres."""
-_THIN_SEAM = 0.002
-"""Of the walls of houses, which are as thin as paper, metres."""
+_HALF = 0.01
+"""Half the thickness of the walls of houses, metres."""
 _THROUGH = 0.03
 """How far a hole in a wall of a house reaches to each side of the wall, metres."""
 _STOREY = 2.4
@@ -105,7 +105,7 @@ class FloorPlan:
         walls: the walls around it.
         holes: boxes ((3,), (3,)) of the windows, where walls are open.
         ground, ceiling: heights.
-        seam: how far walls reach behind those that they meet; less where another room lies there.
+        inset: how far the walls stand inside the fields: behind those of a house is another room.
     """
 
     xs: Floats
@@ -115,7 +115,7 @@ class FloorPlan:
     holes: tuple[tuple[Floats, Floats], ...]
     ground: float
     ceiling: float
-    seam: float = 0.02
+    inset: float = 0.0
 
     def contains(self, point: Floats) -> bool:
         """Whether (x, z) is in the room."""
@@ -159,11 +159,13 @@ def plan_of_rooms(rooms: Sequence[Room], shell: Shell) -> FloorPlan:
         xs=xs,
         zs=zs,
         inside=inside,
-        walls=tuple(_walls(xs, zs, inside)),
+        walls=tuple(
+            replace(wall, at=wall.at + wall.sign * _HALF) for wall in _walls(xs, zs, inside)
+        ),
         holes=tuple(_hole(opening) for opening in shell.openings),
         ground=shell.ground,
         ceiling=shell.ceiling,
-        seam=_THIN_SEAM,
+        inset=_HALF,
     )
 
 

@@ -28,6 +28,8 @@ _BOARD, _BOARD_DEPTH = 0.09, 0.015
 """Height and thickness of the skirting board, metres."""
 _TILED = 1.3
 """Height up to which a bathroom's walls are tiled, metres."""
+_SEAM = 0.02
+"""How far surfaces overlap at edges, metres."""
 _STRIDE = 1.1
 """Distance between vertices in the middle of a surface, metres."""
 _NEAR_EDGES = (0.13, 0.4)
@@ -201,8 +203,8 @@ def _upright(
         )
     low_end, high_end = _ends(plan, wall)
     along[0], along[-1] = low_end, high_end
-    heights[heights <= plan.ground] -= plan.seam
-    heights[heights >= plan.ceiling] += plan.seam
+    heights[heights <= plan.ground] -= _SEAM
+    heights[heights >= plan.ceiling] += _SEAM
     s, y = np.meshgrid(along, heights, indexing="ij")
     uv = np.stack([s.ravel(), y.ravel() - plan.ground], axis=1) / band.turns
     points = _world(wall, s.ravel(), y.ravel())
@@ -214,7 +216,10 @@ def _ends(plan: FloorPlan, wall: Wall) -> tuple[float, float]:
     ends = []
     for end, outward in ((wall.low, -1.0), (wall.high, 1.0)):
         beyond = _world(wall, np.array([end + 0.01 * outward]), np.zeros(1), -0.01)[0, ::2]
-        ends.append(end if plan.contains(beyond) else end + plan.seam * outward)
+        if plan.inset:  # the walls that it meets have moved: towards it, or away from it
+            ends.append(end + plan.inset * outward if plan.contains(beyond) else end)
+        else:
+            ends.append(end if plan.contains(beyond) else end + _SEAM * outward)
     return ends[0], ends[1]
 
 
@@ -337,6 +342,6 @@ def _distances(
     for wall in plan.walls:
         away = wall.sign * (points[:, 2 * wall.axis] - wall.at)
         along = points[:, 2 - 2 * wall.axis]
-        before = (away > -1.5 * plan.seam) & (wall.low - 1e-3 < along) & (along < wall.high + 1e-3)
+        before = (away > -1.5 * _SEAM) & (wall.low - 1e-3 < along) & (along < wall.high + 1e-3)
         before &= ~lies_along[:, 2 * wall.axis]
         yield np.where(before, np.maximum(away, 0.0), np.inf)
