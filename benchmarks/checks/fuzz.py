@@ -126,7 +126,8 @@ class FuzzRun:
         """The knowledge from which the next request is drawn."""
         there = {entry["objectId"] for entry in self.metadata["objects"]}
         gone = [object_id for object_id in self._ids if object_id not in there]
-        return Room(random, scenes, self.metadata, floor(scene_of(self.metadata), 0.25), gone)
+        places = floor(self._player.world.scene.name, 0.25)
+        return Room(random, scenes, self.metadata, places, gone)
 
 
 def play(plan: FuzzPlan, run: int) -> Iterator[FuzzStep]:

@@ -196,7 +196,7 @@ class RoomChecker:
         # A forced teleport may end in a wall.
         forced = name in _TELEPORTS and "forceAction" in request
         if before["agent"]["position"] != after["agent"]["position"] and not forced:
-            yield from stands_on_the_floor(after, floor_points(scene_of(after)))
+            yield from stands_on_the_floor(after, floor_points(world.scene.name))
 
     def _kept_metadata_unchanged(self, metadata: dict[str, Any]) -> Iterator[str]:
         """Metadata that a caller has kept do not change later."""

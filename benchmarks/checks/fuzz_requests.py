@@ -14,6 +14,7 @@ from random import Random
 from types import NoneType
 from typing import Any, get_args, get_origin
 
+from er_gym.houses.generate import generate_house
 from er_gym.sim.actions.refused import REFUSED
 from er_gym.sim.actions.registry import ACTIONS, EXEMPT, Parameter, parameters_of
 from er_gym.sim.actions.state_change import LIQUIDS
@@ -153,6 +154,11 @@ def _position(room: Room) -> dict[str, float]:
     return position
 
 
+def _house(room: Room) -> Request:
+    """A house of one or two rooms."""
+    return deepcopy(generate_house(room.random.randrange(4), room.random.randint(1, 2)))
+
+
 def _coordinate(axis: str) -> Draw:
     return lambda room: _position(room)[axis]
 
@@ -241,6 +247,7 @@ SANE: dict[str, Draw] = {
     "DirectionalPush.moveMagnitude": _between(0.0, 300.0),
     "objectId": _object(),
     "sceneName": lambda room: room.random.choice(room.scenes),
+    "house": _house,
     "forceAction": _among(False, True, True),
     "position": _position,
     "positions": _some(_position, 5),

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from benchmarks.scoring.tables import print_tables
 from benchmarks.terminal import stdout
 from er_gym.tables import Table
-from er_gym.tasks.room_kinds import ROOM_KINDS, room_kind
+from er_gym.tasks.room_kinds import HOUSE, ROOM_KINDS, room_kind
 from er_gym.tasks.splits import split, wording
 from er_gym.tasks.task import Task
 from er_gym.tasks.types import BY_NAME
@@ -26,16 +26,17 @@ def print_counts(
     """
     kinds = [kind for kind in BY_NAME.values() if any(task.type is kind for task in chosen)]
     cells = Counter((task.type, room_kind(task.scene)) for task in chosen)
+    rooms = [*ROOM_KINDS, *([HOUSE] if any(room == HOUSE for _, room in cells) else [])]
     rows = [
-        (kind.group, kind.name, *(str(cells[kind, room]) for room in ROOM_KINDS),
-         str(sum(cells[kind, room] for room in ROOM_KINDS)))
+        (kind.group, kind.name, *(str(cells[kind, room]) for room in rooms),
+         str(sum(cells[kind, room] for room in rooms)))
         for kind in kinds
     ]  # fmt: skip
     rows.append(
-        ("", "all", *(str(sum(cells[kind, room] for kind in kinds)) for room in ROOM_KINDS),
+        ("", "all", *(str(sum(cells[kind, room] for kind in kinds)) for room in rooms),
          str(len(chosen)))
     )  # fmt: skip
-    found = [Table("Tasks", ("Group", "Type", *ROOM_KINDS, "all"), tuple(rows), 2)]
+    found = [Table("Tasks", ("Group", "Type", *rooms, "all"), tuple(rows), 2)]
     if by_scene:
         found += [_scene_table(chosen), _count_table("Splits", Counter(map(split, chosen)))]
         told = Counter(f"in {wording(task) or 'other'} wordings" for task in chosen)

@@ -11,7 +11,7 @@ from textwrap import fill
 from er_gym.tables import Table
 from er_gym.tasks import jsonl_format, verbs
 from er_gym.tasks.difficulty import hidden_depth, length
-from er_gym.tasks.room_kinds import ROOM_KINDS, room_kind
+from er_gym.tasks.room_kinds import HOUSE, ROOM_KINDS, room_kind
 from er_gym.tasks.splits import wording
 from er_gym.tasks.task import Task, type_of_id
 from er_gym.tasks.types import BY_NAME, GROUPS
@@ -93,7 +93,7 @@ def summarise(tasks: Iterable[Task]) -> Summary:
         tasks=len(tasks),
         groups=_in_order(GROUPS, (task.type.group for task in tasks)),
         types=_in_order(BY_NAME, (task.type.name for task in tasks)),
-        room_kinds=_in_order(ROOM_KINDS, (room_kind(task.scene) for task in tasks)),
+        room_kinds=_in_order((*ROOM_KINDS, HOUSE), (room_kind(task.scene) for task in tasks)),
         scenes={scene: scenes[scene] for scene in sorted(scenes, key=_scene_order)},
         subjects=_by_frequency(filter(None, map(subject_type, tasks))),
         receptacles=_by_frequency(name for task in tasks for name in receptacle_types(task)),

@@ -43,8 +43,8 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "nothing": ({"total": 0}, "greater than 0"),
     "a set that is none": (
         {"total": 1, "scenes": "test"},
-        "unknown scene 'test'; give names such as FloorPlan1, or one of: all, training, "
-        "strict, evaluation",
+        "unknown scene 'test'; give names such as FloorPlan1 or House3-17, or one of: all, "
+        "training, strict, evaluation",
     ),
     "a room that is none": ({"total": 1, "scenes": ["FloorPlan1", "Hall"]}, "unknown scene 'Hall'"),
     "a set among rooms": ({"total": 1, "scenes": ["training"]}, "unknown scene 'training'"),
