@@ -75,7 +75,7 @@ ALLOWED = {
     "er_gym.locking": _BASE,
     "er_gym.sim": {*_BASE, "er_gym.sim"},
     "er_gym.houses": {*_BASE, "er_gym.sim", "er_gym.houses"},
-    "er_gym.thor": {*_BASE, "er_gym.sim", "er_gym.thor"},
+    "er_gym.thor": {*_BASE, "er_gym.houses", "er_gym.sim", "er_gym.thor"},
     "er_gym.tasks": _TASKS,
     "er_gym.envs": _ENVS,
     "er_gym.resumable": _TASKS,

@@ -25,7 +25,7 @@ _DEPTH_UNIT = 1000.0
 
 
 @click.command()
-@click.option("--scene", required=True, help="The scene, such as FloorPlan1.")
+@click.option("--scene", required=True, help="The scene, such as FloorPlan1 or House3-17.")
 @click.option(
     "--pose",
     metavar="X,Z,ROTATION[,HORIZON]",
@@ -64,10 +64,11 @@ def render(
     """
     from PIL import Image
 
+    from er_gym.houses.names import is_house
     from er_gym.thor import SCENE_NAMES, UnknownSceneError, make_controller
     from er_gym.writing import check_output, write_picture
 
-    if scene not in SCENE_NAMES:
+    if scene not in SCENE_NAMES and not is_house(scene):
         raise BadInput(str(UnknownSceneError(scene)))
     endings = _ENDINGS_OF_DEPTH if what == "depth" else _ENDINGS
     if out.suffix.lower() not in endings:

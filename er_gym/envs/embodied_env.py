@@ -30,7 +30,7 @@ from er_gym.envs.reset_options import checked_options
 from er_gym.envs.saved_episode import BROKEN_OFF, SavedEpisode
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.envs.window import Window
-from er_gym.houses.names import is_house, named, scene_of
+from er_gym.houses.names import is_house, named
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import types_named
 from er_gym.thor import BACKENDS, LIGHTS, RENDER_DEVICES, check_size, make_controller
@@ -423,7 +423,7 @@ class EmbodiedEnv(SavedEpisode, gymnasium.Env[dict[str, Any], Any]):
     def _started_controller(self, scene: str) -> Any:
         if self._controller is None:
             self._controller = make_controller(
-                self._backend, scene=scene_of(scene), **self._controller_arguments
+                self._backend, scene=scene, **self._controller_arguments
             )
         return self._controller
 

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from er_gym.houses.names import scene_of
 from er_gym.thor.client_folder import Release
 
 if TYPE_CHECKING:
@@ -74,7 +75,8 @@ def make_controller(backend: str = "embedded", **arguments: Any) -> Controller:
     Args:
         backend: "embedded" (our engine, in this process) or "unity" (the real simulator;
             CloudRendering when there is no display).
-        **arguments: the arguments of ``ai2thor.controller.Controller``. The embedded engine also
+        **arguments: the arguments of ``ai2thor.controller.Controller``; ``scene`` may be the name
+            of a house, such as ``House3-17``. The embedded engine also
             takes ``render_device``: "cpu" or "gpu", the same for the whole process; and ``light``:
             "soft", from windows and lamps and with soft shadows, or "flat", the same everywhere.
 
@@ -85,4 +87,6 @@ def make_controller(backend: str = "embedded", **arguments: Any) -> Controller:
     start = BACKENDS.get(backend)
     if start is None:
         raise ValueError(f"unknown backend {backend!r}; choose one of: {', '.join(BACKENDS)}")
+    if isinstance(scene := arguments.get("scene"), str):
+        arguments["scene"] = scene_of(scene)
     return start(dict(arguments))

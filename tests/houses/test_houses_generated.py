@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from support import in_one_test
 
 from benchmarks.cli.houses import houses
+from benchmarks.cli.render import render
 from er_gym.envs.embodied_env import verification_env
 from er_gym.envs.verify import Verifier
 from er_gym.houses.checks import problems
@@ -183,4 +184,8 @@ def test_the_command_writes_houses(tmp_path):
     assert run.invoke(houses, order).exit_code == 0  # the same files again
     (tmp_path / names[0]).write_text("mine")
     assert run.invoke(houses, order).exit_code != 0
+    picture = tmp_path / "house.png"
+    told = run.invoke(render, ["--scene", "House1-3", "--what", "map", "--out", str(picture)])
+    assert told.exit_code == 0, told.output
+    assert picture.exists()
     assert run.invoke(houses, ["generate", "--rooms", "0-9", "--out", str(tmp_path)]).exit_code
