@@ -220,3 +220,12 @@ def test_walls_between_rooms_may_be_left_out(house):
     house.reset(open_plan)
     stand(house, 3.5, 1.0, 90.0)
     assert all(ahead(house, 4))
+
+
+def test_a_room_behind_a_shut_door_is_out_of_reach(house):
+    shut = three_rooms()
+    shut["doors"][0]["openness"] = 0
+    house.reset(shut)
+    places = house.step("GetReachablePositions").metadata["actionReturn"]
+    assert max(place["x"] for place in places) < 4.0
+    assert not house.step("Teleport", position={"x": 5.0, "y": 0.9, "z": 1.0})
