@@ -454,7 +454,7 @@ def test_a_full_disk_harms_no_file(out: str, er_gym: Command, tmp_path: Path) ->
 GENERATE = ("generate", "--workers", "1", "--out", "x.jsonl")
 BAD = {
     "neither out nor suite": (("generate", "--total", "4"), ["--out", "--suite"]),
-    "suite": (("generate", "--suite", "maxi"), ["'maxi'", "er-1k, er-val, mini, train"]),
+    "suite": (("generate", "--suite", "maxi"), ["'maxi'", "er-1k, er-val, houses-1k, mini, train"]),
     "scene": ((*GENERATE, "--scenes", "FloorPlan5,FloorPlan99"), ["'FloorPlan99'", "training"]),
     "set of scenes": ((*GENERATE, "--scenes", "test"), ["'test'", "FloorPlan1", "evaluation"]),
     "type": ((*GENERATE, "--types", "single_pickup,cook"), ["'cook'", "single_search"]),

@@ -150,7 +150,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "no such suite": (
         {"suite": "maxi"},
-        r"unknown suite 'maxi'; choose one of: er-1k, er-val, mini",
+        r"unknown suite 'maxi'; choose one of: er-1k, er-val, houses-1k, mini",
     ),
     "no such file": ({"suite": "no/such.jsonl"}, r"no/such\.jsonl: no such file"),
     "another kind of file": ({"suite": "some/tasks.csv"}, r"a task file ends in \.json"),
