@@ -250,9 +250,12 @@ class Bad:
 
 
 BAD = {
-    "no tasks": Bad({"suite": None}, "give --suite (one of: er-1k, er-val, houses-1k, mini, train)"),
+    "no tasks": Bad(
+        {"suite": None}, "give --suite (one of: er-1k, er-val, houses-1k, mini, train)"
+    ),
     "suite": Bad(
-        {"suite": "nope"}, "unknown suite 'nope'; choose one of: er-1k, er-val, houses-1k, mini, train"
+        {"suite": "nope"},
+        "unknown suite 'nope'; choose one of: er-1k, er-val, houses-1k, mini, train",
     ),
     "limit": Bad({"limit": 0}, "'--limit': 0 is not in the range x>=1"),
     "no number": Bad({"limit": "all"}, "'--limit': 'all' is not a valid"),

@@ -219,7 +219,9 @@ def test_the_paper_tasks_fit_their_scenes(shared_data) -> None:
     assert fitted.substitutions == fitted.set_aside == ()
 
 
-@pytest.mark.parametrize(("name", "every"), [("mini", 3), ("er-1k", 20), ("houses-1k", 250), ("train", 200)])
+@pytest.mark.parametrize(
+    ("name", "every"), [("mini", 3), ("er-1k", 20), ("houses-1k", 250), ("train", 200)]
+)
 def test_what_comes_with_er_gym_fits_as_it_is(name: str, every: int) -> None:
     suite = load_suite(name)
     some = replace(suite, tasks=suite.tasks[::every])
