@@ -23,7 +23,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor
 
 from agents.rl.callbacks import TorchThreads
 from agents.rl.config import PPO, TrainConfig, config_file, load_config
-from agents.rl.policy import make
+from agents.rl.ppo import make
 from agents.rl.train import make_vec_env, training_speedups
 
 
