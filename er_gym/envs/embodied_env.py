@@ -441,7 +441,7 @@ class EmbodiedEnv(SavedEpisode, gymnasium.Env[dict[str, Any], Any]):
         scene: str | Mapping[str, Any] | None = None,
         suite: Source | None = None,
     ) -> Task:
-        if isinstance(scene, Mapping):
+        if not isinstance(scene, str) and isinstance(scene, Mapping):
             scene = named(scene)
         source = self._source
         if suite is not None:

@@ -187,13 +187,13 @@ def load_scene(name: str) -> Scene:
     Raises:
         UnknownSceneError: ``name`` is not one of :data:`SCENE_NAMES`.
     """
-    house = HOUSES.get(name)
-    if house is not None:
-        return house
     plain = name.removesuffix("_physics")
-    if plain not in SCENE_NAMES:
+    if plain in SCENE_NAMES:
+        return _load_packaged(plain)
+    house = HOUSES.get(name)
+    if house is None:
         raise UnknownSceneError(name)
-    return _load_packaged(plain)
+    return house
 
 
 @cache
