@@ -88,7 +88,7 @@ ALLOWED = {
     "benchmarks.scoring": _SCORING,
     "benchmarks.terminal": {*_ENVS, "benchmarks.terminal"},
     "benchmarks.study": _STUDY,
-    "benchmarks.unity": {*_ENVS, "benchmarks.unity"},
+    "benchmarks.unity": {*_DATA, "benchmarks.unity"},
     "benchmarks.leaderboard": {*_STUDY, "benchmarks.leaderboard"},
     "benchmarks.vision_probe": {*_COMMAND, "benchmarks.vision_probe"},
     "benchmarks.vlm_run": _AGENTS,

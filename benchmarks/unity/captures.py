@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from er_gym.data.pictures import open_picture
 from er_gym.writing import make_folder, write_output, write_picture
 
 FORMAT, SCENE_FORMAT = "er-gym/unity-captures/1", "er-gym/unity-capture/1"
@@ -153,7 +154,7 @@ def load(folder: Path, scene: str) -> RoomCapture:
             raise ValueError(f"its format is {told['format']!r}, and {SCENE_FORMAT} is read")
         reachable = np.array(told["reachable"], np.float64).reshape(-1, 3)
         pictures = [
-            np.asarray(Image.open(picture_file(folder, scene, number)).convert("RGB"))
+            np.asarray(open_picture(picture_file(folder, scene, number)))
             for number in range(len(told["views"]))
         ]
         return RoomCapture(scene, told["metadata"], reachable, told["views"], pictures)
