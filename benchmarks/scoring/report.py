@@ -28,6 +28,7 @@ from er_gym.rollout.records import EpisodeRecord, episode_key
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.tables import Table
 from er_gym.tasks.errors import describe_substitutions
+from er_gym.tasks.suites import suite_version
 from er_gym.tasks.types import BY_NAME, GROUPS
 
 BOTH = "both"
@@ -205,6 +206,7 @@ def _run(run: RunReport) -> dict[str, Any]:
         "path": str(run.path),
         "protocol": run.manifest.protocol,
         "manifest": run.manifest.model_dump(),
+        "suite_version": suite_version(run.manifest.suite, run.manifest.suite_digest),
         "episodes": len(run.episodes),
         "crashed": run.crashed,
         "causes": [
@@ -215,6 +217,7 @@ def _run(run: RunReport) -> dict[str, Any]:
         "scorers_differ": run.differ,
         "scorers": {
             name: {
+                "version": SCORERS[name].version,
                 "slices": [
                     {
                         "level": level,

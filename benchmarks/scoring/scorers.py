@@ -56,10 +56,12 @@ class Scorer:
     Attributes:
         name: as ``--scorer`` takes it.
         walk: through an episode, as if it had not crashed.
+        version: changes when the same record is read in another way.
     """
 
     name: str
     walk: Callable[[EpisodeRecord], KeyActionCounts]
+    version: int = 1
 
     def count(self, episode: EpisodeRecord) -> KeyActionCounts:
         """What was done; an episode that crashed is no success (:mod:`er_gym.rollout.outcomes`)."""

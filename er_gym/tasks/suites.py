@@ -66,6 +66,8 @@ class SuiteConfig(BaseModel):
     Attributes:
         description: a sentence for people.
         tasks: the name of the task file.
+        versions: how the digest of each version of the tasks begins, the oldest first; the last one
+            is that of the tasks now. A suite's version changes with its tasks alone.
         env: keyword arguments of ``EmbodiedEnv``.
         generate: which tasks to generate.
         seed: the seed of the generator.
@@ -75,6 +77,7 @@ class SuiteConfig(BaseModel):
 
     description: str
     tasks: str
+    versions: tuple[str, ...] = ()
     env: dict[str, Any] = {}
     generate: SuiteSpec | None = None
     seed: int = 0
@@ -200,6 +203,15 @@ def suite_config(name: str) -> SuiteConfig:
         raise PluginError(suite_registry().unknown(name[:_LONGEST_QUOTE]))
     file = config_directory("suites") / f"{name}.yaml"
     return validated(SuiteConfig, read_yaml(file), f"{file}: the suite")
+
+
+def suite_version(name: str, digest: str) -> int | None:
+    """The version, from 1, of er-gym's suite of a name whose tasks have a digest; None for other
+    tasks."""
+    if name not in suite_names():
+        return None
+    versions = suite_config(name).versions
+    return next((n for n, each in enumerate(versions, 1) if digest.startswith(each)), None)
 
 
 def suite_file(name: str) -> Path:

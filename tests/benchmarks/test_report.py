@@ -158,6 +158,8 @@ def test_another_protocol_than_the_default_is_named(run, tmp_path, manifest, epi
         str(papers.path): "paper",
     }
     data = json.loads(report.as_json([run, papers]))["runs"]
+    assert data[0]["suite_version"] is None  # these are no tasks of er-gym's suites
+    assert {each["version"] for each in data[0]["scorers"].values()} == {1}
     assert [each["protocol"] for each in data] == ["default", "paper"]
 
 

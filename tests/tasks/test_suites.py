@@ -133,6 +133,15 @@ def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
         suite_from_file(tmp_path / "tasks.csv")
 
 
+def test_the_last_version_of_each_suite_is_that_of_its_tasks() -> None:
+    for name in suites.suite_names():
+        if suites.suite_file(name).exists():
+            found = suites.suite_version(name, load_suite(name).digest)
+            assert found == len(suites.suite_config(name).versions) > 0, name
+    assert suites.suite_version("mini", "0" * 64) is None
+    assert suites.suite_version("of another package", "0" * 64) is None
+
+
 def test_an_unknown_suite_is_answered_with_those_there_are() -> None:
     with pytest.raises(ValueError, match=r"unknown suite 'maxi'; choose one of: .*mini"):
         load_suite("maxi")
