@@ -40,6 +40,19 @@ def test_a_source_is_compiled_once(source: Path, monkeypatch: pytest.MonkeyPatch
 
 
 @needs_compiler
+def test_what_suits_one_processor_is_compiled_again_for_another(
+    source: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for exact in (True, False):
+        assert compiled(source, exact=exact) is not None
+    monkeypatch.setattr(shared_library, "_processor", lambda: "another")
+    monkeypatch.setattr(shared_library.subprocess, "run", never)
+    assert compiled(source) is not None
+    with pytest.raises(AssertionError, match="compiled again"):
+        compiled(source, exact=False)
+
+
+@needs_compiler
 def test_no_cache_is_needed(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(source))  # a file
     library = compiled(source)

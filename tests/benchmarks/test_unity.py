@@ -46,6 +46,19 @@ def test_the_player_agrees_with_the_engine_in_everything(captures: Path, tmp_pat
     assert (tmp_path / "report" / f"{SCENE}.png").is_file()
 
 
+def test_a_view_is_that_of_its_pose(captures: Path) -> None:
+    room = load(captures, SCENE)
+    assert [view["error"] for view in room.views] == ["", ""]
+    with er_gym.make_controller(width=64, height=48) as controller:
+        controller.reset(SCENE)
+        for view, picture in zip(room.views, room.pictures, strict=True):
+            event = controller.step("TeleportFull", **view["pose"], forceAction=True)
+            seen = {each["objectId"] for each in event.metadata["objects"] if each["visible"]}
+            assert {*view["visible"]} == seen
+            assert (picture == event.frame).all()
+    assert (room.pictures[0] != room.pictures[1]).any()
+
+
 def test_what_is_captured_already_is_left_as_it_is(captures: Path) -> None:
     before = room_file(captures, SCENE).stat().st_mtime_ns
     told = json.loads((captures / "captures.json").read_text())

@@ -10,6 +10,10 @@ import torch
 from torch.nn import functional
 
 from agents.vlm.clients.compiled_attention import NextTokens, addresses, has_kernel
+from agents.vlm.clients.kv_cache import CachedTurns
+from agents.vlm.clients.packed_rows import PackedRow
+from agents.vlm.clients.padded_batch import EncodedPrompt
+from agents.vlm.settings import Sampling
 
 pytestmark = pytest.mark.skipif(not has_kernel(), reason="this machine has no C compiler")
 
@@ -71,3 +75,21 @@ def test_scores_of_any_size_give_no_overflow() -> None:
     keys, values = memory[0]
     wanted = functional.scaled_dot_product_attention(query, keys[None], values[None], scale=1.0)
     torch.testing.assert_close(found[:, 0], wanted[:, :, 0])
+
+
+def test_the_kernel_follows_a_memory_that_has_moved_since_it_was_full() -> None:
+    layers = [(torch.zeros(2, 12, 16), torch.zeros(2, 12, 16)) for _ in range(3)]
+    ids = list(range(10))
+    prompt = EncodedPrompt(
+        ids=ids, pictures=[], grids=None, new_pixels=None, new_pictures=0, seed=0, thinking=False,
+        name="", kept=CachedTurns(ids[:9], [], None, layers), reused=9,
+    )  # fmt: skip
+    row = PackedRow(prompt, Sampling(max_tokens=8))
+    rooms = []
+    for done in range(10, 18):
+        row.done = done
+        room, places = row.memory()
+        assert room > done
+        assert (places == addresses(row.turns().layers)).all()
+        rooms.append(room)
+    assert rooms[0] == 12 < rooms[-1]  # it was full in between
