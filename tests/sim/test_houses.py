@@ -229,3 +229,12 @@ def test_a_room_behind_a_shut_door_is_out_of_reach(house):
     places = house.step("GetReachablePositions").metadata["actionReturn"]
     assert max(place["x"] for place in places) < 4.0
     assert not house.step("Teleport", position={"x": 5.0, "y": 0.9, "z": 1.0})
+
+
+def test_a_window_down_to_the_floor_is_no_way(house):
+    glazed = three_rooms()
+    door = glazed["doors"].pop(0)
+    glazed["windows"].append({**door, "id": "window|1|2", "assetId": "Window_Fixed_60x36"})
+    house.reset(glazed)
+    places = house.step("GetReachablePositions").metadata["actionReturn"]
+    assert max(place["x"] for place in places) < 4.0
