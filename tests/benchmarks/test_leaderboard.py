@@ -420,17 +420,18 @@ def test_what_a_stranger_invents_is_a_problem_and_no_error(runs: Runs, tmp_path:
 HEADER = b'{"format": "er-gym/submission/1"}\n'
 
 
-@pytest.mark.parametrize(
-    ("data", "words"),
-    [
-        (b"no gzip", "not a whole gzip file"),
-        (gzip.compress(b""), "empty"),
-        (gzip.compress(HEADER), "the first line lacks field 'name'"),
-        (gzip.compress(b"{"), "not JSON"),
-        (gzip.compress(b"[" * 5_000_000), "line 1 is longer than 4 MiB"),
-        (gzip.compress(b"[" * 3000), "nested too deeply"),
-    ],
-)
+# Named here: a gzip's bytes hold the time, and pytest would make ids of them.
+NO_SUBMISSION = {
+    "no gzip": (b"no gzip", "not a whole gzip file"),
+    "nothing": (gzip.compress(b""), "empty"),
+    "no name": (gzip.compress(HEADER), "the first line lacks field 'name'"),
+    "no JSON": (gzip.compress(b"{"), "not JSON"),
+    "a long line": (gzip.compress(b"[" * 5_000_000), "line 1 is longer than 4 MiB"),
+    "nested": (gzip.compress(b"[" * 3000), "nested too deeply"),
+}
+
+
+@pytest.mark.parametrize(("data", "words"), NO_SUBMISSION.values(), ids=NO_SUBMISSION)
 def test_a_file_that_is_no_submission_is_one_line(
     runs: Runs, tmp_path: Path, data: bytes, words: str
 ) -> None:
