@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import comb
 from statistics import fmean
 from typing import Literal, TypeAlias
 
 from benchmarks.monitor.event_tail import EpisodeRow
+from benchmarks.scoring.metrics import TIDY
 from benchmarks.scoring.paired import paired_difference
 
 Change: TypeAlias = Literal["gained", "lost", "both", "neither"]
 CHANGES: tuple[Change, ...] = ("gained", "lost", "both", "neither")
 """Which of two runs a task succeeds more often in: the second, the first; or in both as often, or
 in neither."""
+MEASURES = ("success", TIDY)
+"""What runs are compared by."""
 _FEWEST = 10
 """Over fewer tasks no interval is told."""
 
@@ -26,16 +29,21 @@ class Pair:
     Attributes:
         task_id: its id.
         first, second: what each run tells of its episodes, at least one.
+        measure: what is compared, one of :data:`MEASURES`, which all of them tell.
     """
 
     task_id: str
     first: Sequence[EpisodeRow]
     second: Sequence[EpisodeRow]
+    measure: str = "success"
 
     @property
     def rates(self) -> tuple[float, float]:
         """The share of its episodes that succeeded, in each run."""
-        return fmean(row.success for row in self.first), fmean(row.success for row in self.second)
+        first, second = (
+            fmean(getattr(row, self.measure) for row in rows) for rows in (self.first, self.second)
+        )
+        return first, second
 
     @property
     def change(self) -> Change:
@@ -80,11 +88,23 @@ class Difference:
     chance: float
 
 
-def pairs_of(first: Mapping[str, EpisodeRow], second: Mapping[str, EpisodeRow]) -> list[Pair]:
+def measures_of(runs: Iterable[Mapping[str, EpisodeRow]]) -> tuple[str, ...]:
+    """The measures by which some runs can be compared: those that all their results tell."""
+    results = [row.result for rows in runs for row in rows.values()]
+    return tuple(
+        measure
+        for measure in MEASURES
+        if all(row is None or getattr(row, measure) is not None for row in results)
+    )
+
+
+def pairs_of(
+    first: Mapping[str, EpisodeRow], second: Mapping[str, EpisodeRow], measure: str = "success"
+) -> list[Pair]:
     """The tasks that have come out in both runs; episodes that crashed are failures, as everywhere
     (:mod:`er_gym.rollout.outcomes`)."""
     one, other = _by_task(first), _by_task(second)
-    return [Pair(task, rows, other[task]) for task, rows in one.items() if task in other]
+    return [Pair(task, rows, other[task], measure) for task, rows in one.items() if task in other]
 
 
 def _by_task(rows: Mapping[str, EpisodeRow]) -> dict[str, list[EpisodeRow]]:
@@ -104,7 +124,8 @@ def difference(name: str, pairs: Sequence[Pair]) -> Difference:
     mean, low, high = 0.0, None, None
     if pairs:
         before = [row for pair in pairs for row in pair.first]
-        estimate = paired_difference(before, [row for pair in pairs for row in pair.second])
+        after = [row for pair in pairs for row in pair.second]
+        estimate = paired_difference(before, after, pairs[0].measure)
         mean = estimate.mean
         if len(pairs) >= _FEWEST and counts["gained"] + counts["lost"]:
             low, high = estimate.low, estimate.high

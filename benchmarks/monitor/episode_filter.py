@@ -22,6 +22,7 @@ SORTS: Mapping[str, Callable[[EpisodeRow], Any]] = {
     "failure": lambda row: row.failure,
     "efficiency": lambda row: row.metric("search_efficiency") or 0.0,
     "completeness": lambda row: row.metric("completeness") or 0.0,
+    "effects": lambda row: -1 if row.side_effects is None else row.side_effects,
     "steps": lambda row: row.steps,
     "reward": lambda row: row.reward,
     "tokens": lambda row: row.tokens,

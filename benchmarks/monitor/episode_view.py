@@ -15,6 +15,7 @@ from benchmarks.scoring.scorers import CORRECTED
 from er_gym.rollout.judgement import judged_by_step
 from er_gym.rollout.records import EpisodeRecord, StepRecord
 from er_gym.rollout.run_directory import CONVERSATIONS, PICTURES, RunDirectory
+from er_gym.tasks.task import type_of_id
 from er_gym.tasks.verbs import INIT
 from er_gym.writing import file_stem, inside
 
@@ -65,6 +66,24 @@ class StepView:
 
 
 @dataclass(frozen=True)
+class SideEffect:
+    """What the agent changed that the task did not ask for.
+
+    Attributes:
+        kind: one of :data:`er_gym.tasks.side_effects.KINDS`.
+        object_id: of what was changed.
+    """
+
+    kind: str
+    object_id: str
+
+    @property
+    def object_type(self) -> str:
+        """The type of what was changed."""
+        return type_of_id(self.object_id)
+
+
+@dataclass(frozen=True)
 class EpisodeView:
     """An episode.
 
@@ -88,6 +107,14 @@ class EpisodeView:
     cost: float
     problem: str
     conversation: ConversationRecord | None = None
+
+    @property
+    def side_effects(self) -> list[SideEffect] | None:
+        """Its side effects; None if the record does not tell them."""
+        if self.record.side_effects is None:
+            return None
+        told = (each.partition(" ") for each in self.record.side_effects)
+        return [SideEffect(kind, object_id) for kind, _, object_id in told]
 
     def request(self, number: int) -> list[MessageRecord]:
         """The request for a step, with all messages as they were sent.

@@ -12,7 +12,7 @@ from pydantic_core import from_json
 
 from benchmarks.monitor.line_tail import LineFollower, Lines
 from benchmarks.monitor.notes import Note
-from benchmarks.scoring.metrics import METRICS
+from benchmarks.scoring.metrics import METRICS, tidy_success
 from er_gym.rollout.causes import EpisodeCauses
 from er_gym.rollout.outcomes import succeeded
 from er_gym.rollout.records import sample_of_key, task_of_key
@@ -33,11 +33,20 @@ class Figures(NamedTuple):
         metrics: those of :data:`benchmarks.scoring.metrics.METRICS` by the corrected scorer; none
             if its record cannot be read.
         by_paper: success by the paper's scorer.
+        side_effects: the kind of each (:mod:`er_gym.tasks.side_effects`); None if the record does
+            not tell them.
     """
 
     failure: str
     metrics: tuple[float, ...] = ()
     by_paper: bool = False
+    side_effects: tuple[str, ...] | None = None
+
+    @property
+    def tidy_success(self) -> bool | None:
+        """As :attr:`EpisodeRow.tidy_success`, by the corrected scorer."""
+        effects = None if self.side_effects is None else len(self.side_effects)
+        return tidy_success(bool(self.metrics[0]), effects)
 
 
 @dataclass(slots=True)
@@ -55,6 +64,8 @@ class EpisodeRow:
         tokens, cost: of the model's replies that were not cached, cost in US dollars.
         last: the last action.
         causes: of its unusable replies; None while it plays.
+        side_effects: how many it had; None while it plays, and if neither the stream nor its record
+            tells them.
         before: while it is played again, the result that it had: it had crashed.
         figures: what its record tells; None until it has been read.
         note: what people noted of it; None for nothing.
@@ -77,6 +88,7 @@ class EpisodeRow:
     cost: float = 0.0
     last: str = ""
     causes: EpisodeCauses | None = None
+    side_effects: int | None = None
     before: EpisodeRow | None = None
     figures: Figures | None = None
     note: Note | None = None
@@ -106,6 +118,12 @@ class EpisodeRow:
         read."""
         told = self.figures.metrics if self.figures else ()
         return told[METRICS.index(name)] if told else None
+
+    @property
+    def tidy_success(self) -> bool | None:
+        """Whether it is a success without side effects
+        (:func:`benchmarks.scoring.metrics.tidy_success`)."""
+        return tidy_success(self.success, self.side_effects)
 
     @property
     def outcome(self) -> str:
@@ -229,6 +247,8 @@ class EventTail(LineFollower):
         row.end_reason, row.before = str(event["end_reason"]), None
         row.steps, row.seconds = int(event["steps"]), float(event["seconds"])
         row.reward = float(event["total_reward"])
+        effects = event.get("side_effects")
+        row.side_effects = None if effects is None else int(effects)
         row.causes = EpisodeCauses(
             int(event.get("replies", 0)),
             {str(name): int(number) for name, number in event.get("causes", {}).items()},

@@ -5,6 +5,7 @@ Records are read a few at a time, each once, while pages wait and while they are
 
 from __future__ import annotations
 
+import sys
 import time
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -12,13 +13,24 @@ from dataclasses import dataclass, field
 
 from benchmarks.monitor.event_tail import EpisodeRow, Figures
 from benchmarks.monitor.failures import FAILURES, failure_of
-from benchmarks.scoring.metrics import METRICS, Estimate, Score, estimate_of, score_episode
+from benchmarks.scoring.metrics import (
+    METRICS,
+    TIDY,
+    Estimate,
+    Score,
+    estimate_of,
+    score_episode,
+    success_rate,
+)
 from benchmarks.scoring.samples import most_samples
 from benchmarks.scoring.scorers import CORRECTED, PAPER
 from er_gym.rollout.run_directory import RunDirectory
+from er_gym.tasks.side_effects import KINDS
 
 BESIDE_SUCCESS = ("search_efficiency", "completeness")
 """The metrics that the paper's table has beside success."""
+SHOWN = (METRICS[0], TIDY, *METRICS[1:])
+"""The metrics in the order in which pages give them."""
 
 
 @dataclass
@@ -53,6 +65,8 @@ class RecordFigures:
                 known = self._found[row.key] = row.ended, _figures(run, row)
                 late = time.monotonic() > until
             row.figures = known[1]
+            if row.side_effects is None and row.figures and row.figures.side_effects is not None:
+                row.side_effects = len(row.figures.side_effects)
             self.done += 1
 
 
@@ -90,16 +104,20 @@ class Means:
 
     Attributes:
         n: how many of them have been read.
-        metrics: by their names, by the corrected scorer.
+        metrics: by their names, by the corrected scorer; tidy success among them where all tell it.
         by_paper: the share of successes by the paper's scorer.
+        side_effects: how many there were of each kind that occurs, most frequent first.
+        effects_n: how many of the episodes tell theirs.
     """
 
     n: int
     metrics: Mapping[str, Estimate]
     by_paper: float
+    side_effects: Mapping[str, int]
+    effects_n: int
 
     @staticmethod
-    def of(rows: Iterable[EpisodeRow], metrics: Collection[str] = METRICS) -> Means | None:
+    def of(rows: Iterable[EpisodeRow], metrics: Collection[str] = SHOWN) -> Means | None:
         """The means over the episodes that have been read; None if none has.
 
         Args:
@@ -112,14 +130,22 @@ class Means:
         tasks, several = [row.task_id for row in read], most_samples(read) > 1
         told: Sequence[Figures] = [row.figures for row in read if row.figures is not None]
         columns = zip(*(each.metrics for each in told), strict=True)
+        means = {
+            name: estimate_of(name, tasks, values, several)
+            for name, values in zip(METRICS, columns, strict=True)
+            if name in metrics
+        }
+        tidy = [each.tidy_success for each in told]
+        if TIDY in metrics and None not in tidy:
+            means[TIDY] = success_rate(tasks, [bool(each) for each in tidy])
+        effects = [each.side_effects for each in told if each.side_effects is not None]
+        kinds = Counter(kind for each in effects for kind in each)
         return Means(
-            len(read),
-            {
-                name: estimate_of(name, tasks, values, several)
-                for name, values in zip(METRICS, columns, strict=True)
-                if name in metrics
-            },
-            sum(each.by_paper for each in told) / len(told),
+            n=len(read),
+            metrics={name: means[name] for name in metrics if name in means},
+            by_paper=sum(each.by_paper for each in told) / len(told),
+            side_effects=dict(kinds.most_common()),
+            effects_n=len(effects),
         )
 
 
@@ -131,6 +157,15 @@ def _figures(run: RunDirectory, row: EpisodeRow) -> Figures | None:
             failure=failure_of(record) or "",
             metrics=tuple(float(getattr(score, name)) for name in METRICS),
             by_paper=PAPER.count(record).success,
+            side_effects=_kinds(record.side_effects),
         )
     except (ValueError, OSError, KeyError):  # the file is gone or damaged, or of another package
         return Figures("crashed") if row.outcome == "crashed" else None
+
+
+def _kinds(side_effects: Sequence[str] | None) -> tuple[str, ...] | None:
+    """The kind of each side effect; that of a record of other hands may be any word."""
+    if side_effects is None:
+        return None
+    kinds = (each.partition(" ")[0] for each in side_effects)
+    return tuple(sys.intern(kind) if kind in KINDS else "-" for kind in kinds)

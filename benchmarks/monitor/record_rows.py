@@ -105,6 +105,7 @@ def _row_of(record: EpisodeRecord, ended: float) -> EpisodeRow:
         reward=record.total_reward,
         seconds=record.seconds,
         causes=causes_in(record),
+        side_effects=None if record.side_effects is None else len(record.side_effects),
     )
 
 

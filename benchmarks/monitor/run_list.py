@@ -17,6 +17,7 @@ SORTS: Mapping[str, Callable[[RunSummary], Any]] = {
     "state": lambda run: (run.state, run.directory.name),
     "progress": lambda run: run.finished,
     "success": lambda run: -1.0 if run.success.rate is None else run.success.rate,
+    "tidy": lambda run: -1.0 if run.success.tidy is None else run.success.tidy.mean,
     "crashed": lambda run: run.counts["crashed"],
     "tokens": lambda run: run.spent.tokens,
     "cost": lambda run: run.spent.cost,

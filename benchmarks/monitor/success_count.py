@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from benchmarks.monitor.event_tail import EpisodeRow
-from benchmarks.scoring.metrics import success_rate
+from benchmarks.scoring.metrics import Estimate, success_rate
+
+Result: TypeAlias = tuple[str, bool, bool | None]
 
 
 @dataclass(frozen=True)
@@ -15,15 +18,18 @@ class SuccessCount:
 
     Attributes:
         name: of what was counted.
-        results: the task of each episode that has come out, and whether it is a success.
+        results: of each episode that has come out its task, whether it is a success, and whether it
+            is a tidy one; None if nobody tells.
         rate, low, high: success with its 95 % interval, as fractions; None without episodes.
+        tidy: tidy success; None without episodes, and if not all tell it.
     """
 
     name: str
-    results: Sequence[tuple[str, bool]] = field(default=(), repr=False)
+    results: Sequence[Result] = field(default=(), repr=False)
     rate: float | None = None
     low: float | None = None
     high: float | None = None
+    tidy: Estimate | None = None
 
     @property
     def n(self) -> int:
@@ -33,21 +39,23 @@ class SuccessCount:
     @property
     def successes(self) -> int:
         """How many of them are a success."""
-        return sum(success for _, success in self.results)
+        return sum(success for _, success, _ in self.results)
 
     @staticmethod
-    def over(name: str, results: Sequence[tuple[str, bool]]) -> SuccessCount:
+    def over(name: str, results: Sequence[Result]) -> SuccessCount:
         """Count some results."""
         if not results:
             return SuccessCount(name)
-        tasks, successes = zip(*results, strict=True)
+        tasks, successes, tidy = zip(*results, strict=True)
         estimate = success_rate(tasks, successes)
-        return SuccessCount(name, results, estimate.mean, estimate.low, estimate.high)
+        told = None if None in tidy else success_rate(tasks, tidy)
+        return SuccessCount(name, results, estimate.mean, estimate.low, estimate.high, told)
 
     @staticmethod
     def of(name: str, rows: Iterable[EpisodeRow]) -> SuccessCount:
         """Count the episodes of a run."""
         told = [row.result for row in rows]
         return SuccessCount.over(
-            name, [(row.task_id, row.success) for row in told if row is not None]
+            name,
+            [(row.task_id, row.success, row.tidy_success) for row in told if row is not None],
         )

@@ -25,8 +25,9 @@ _MOST_BYTES = 16 * 2**20
 def record_so_far(path: Path, manifest: Manifest, row: EpisodeRow) -> EpisodeRecord:
     """The record of an episode that is under way, as far as the event stream tells it.
 
-    The stream tells of a step what was done, whether it was, the reward and the thought; not the
-    feedback. The key actions are those of the task, where it is of a suite of er-gym's.
+    The stream tells of a step what was done, whether it was, the reward, the thought and the
+    feedback, which streams of older versions lack. The key actions are those of the task, where it
+    is of a suite of er-gym's.
     """
     steps = [StepRecord(verb=INIT, success=True), *_steps(path / EVENTS, row.key)]
     told: dict[str, Any] = {
@@ -79,7 +80,7 @@ def _steps(stream: Path, key: str) -> list[StepRecord]:
     return found
 
 
-_TOLD = {"verb", "object_type", "success", "reward", "thought"}
+_TOLD = {"verb", "object_type", "success", "reward", "thought", "feedback"}
 
 
 def _last_lines(stream: Path) -> list[bytes]:

@@ -151,14 +151,21 @@ IF_TOLD = (TIDY, SIDE_EFFECTS)
 """Further ones, which are averaged where every score has them: older records lack them."""
 
 
+def tidy_success(success: bool, side_effects: int | None) -> bool | None:
+    """Whether an episode is a success without side effects; None for a success of which nobody
+    tells them (a failure is none, whatever else it did)."""
+    if success and side_effects is None:
+        return None
+    return success and not side_effects
+
+
 def score_episode(episode: EpisodeRecord, scorer: Scorer) -> Score:
     """All metrics of one episode."""
     counted = scorer.count(episode)
     missing = Counter(counted.expected) - Counter(counted.scored)
     if counted.points > len(counted.scored):
         missing.pop(END, None)
-    effects = episode.side_effects
-    tidy = None if counted.success and effects is None else counted.success and not effects
+    effects = None if episode.side_effects is None else len(episode.side_effects)
     return Score(
         task_id=episode.task_id,
         task_type=episode.task_type,
@@ -173,8 +180,8 @@ def score_episode(episode: EpisodeRecord, scorer: Scorer) -> Score:
         key_action_precision=key_action_precision(episode, counted),
         missing=tuple(missing.elements()),
         sample=episode.sample,
-        tidy_success=tidy,
-        side_effects=None if effects is None else len(effects),
+        tidy_success=tidy_success(counted.success, effects),
+        side_effects=effects,
     )
 
 

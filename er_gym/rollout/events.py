@@ -102,6 +102,7 @@ class StepDone(_Event):
         success: whether the action was legal and the simulator did it.
         reward: what the step earned.
         thought: the agent's reasoning.
+        feedback: what the environment said of it; "" in streams of older versions.
     """
 
     kind: Literal["step"] = "step"
@@ -112,6 +113,7 @@ class StepDone(_Event):
     success: bool
     reward: float
     thought: Words = ""
+    feedback: Words = ""
 
 
 class EpisodeEnded(GrownRecord, _Event):
@@ -126,9 +128,10 @@ class EpisodeEnded(GrownRecord, _Event):
         error: the error it crashed with, in one line; ``""`` if it did not crash.
         replies, causes, unusable, ended: its causes, as
             :class:`er_gym.rollout.causes.EpisodeCauses` has it.
+        side_effects: how many its record tells; None if it tells none.
     """
 
-    added = ("replies", "causes", "unusable", "ended")
+    added = ("replies", "causes", "unusable", "ended", "side_effects")
 
     kind: Literal["episode_ended"] = "episode_ended"
     task_id: str
@@ -143,6 +146,7 @@ class EpisodeEnded(GrownRecord, _Event):
     causes: dict[str, int] = {}
     unusable: dict[str, int] = {}
     ended: str = ""
+    side_effects: int | None = None
 
 
 class Cost(_Event):

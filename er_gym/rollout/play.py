@@ -155,6 +155,7 @@ def _emit_step(
             success=step.success,
             reward=step.reward,
             thought=step.thought,
+            feedback=step.feedback,
         )
     )
 

@@ -124,6 +124,7 @@ def _ended(key: str, record: EpisodeRecord) -> EpisodeEnded:
         steps=sum(not step.appended for step in record.steps[1:]),
         seconds=record.seconds,
         error=record.error,
+        side_effects=None if record.side_effects is None else len(record.side_effects),
         **vars(causes_in(record)),
     )
 

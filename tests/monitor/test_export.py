@@ -230,7 +230,7 @@ def test_a_browser_opens_it_from_the_disk(runs, tmp_path):
         page.get_by_role("link", name="Clear").click()
         assert rows.count() == 8
         page.locator("#rows th a", has_text="Steps").click()
-        cells = page.locator("#rows tbody td:nth-child(7)").all_text_contents()
+        cells = page.locator("#rows tbody td:nth-child(8)").all_text_contents()
         steps = [int(each.partition("/")[0]) for each in cells]
         assert steps == sorted(steps)
         assert sum(each <= 10 for each in steps) == short

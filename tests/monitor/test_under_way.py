@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 import shutil
@@ -47,7 +48,7 @@ def test_its_steps_room_and_key_actions_are_shown_as_they_come(last, visit):
     actions = [f"{each.verb} {each.object_type}".strip() for each in record.steps[1:]]
     assert len(steps()) == 3
     step = {"kind": "step", "task_id": record.key, "step": 3, "verb": "observe", "success": False}
-    step |= {"reward": 1.0, "thought": "<script>x</script>"}
+    step |= {"reward": 1.0, "thought": "<script>x</script>", "feedback": "<b>No</b> \u202eway."}
     with (folder / EVENTS).open("a") as file:
         file.write(json.dumps(step, separators=(",", ":")) + "\n" + rest[0].replace("step", "ste"))
     shown = steps()
@@ -56,6 +57,12 @@ def test_its_steps_room_and_key_actions_are_shown_as_they_come(last, visit):
     page = client.get(f"{address}/episode", params={"key": record.key}).text
     assert "&lt;script&gt;x&lt;/script&gt;" in page
     assert "<script>x" not in page
+    said = re.findall('<p class="feedback">(.*?)</p>', page)
+    assert [html.unescape(each) for each in said] == [
+        *(each.feedback for each in record.steps[1:3]),
+        "<b>No</b> ⟨U+202E⟩way.",
+    ]
+    assert "<b>No" not in page
     assert 'class="room"' in client.get(f"{address}/map", params={"key": record.key}).text
     assert client.get(f"{address}/frame", params={"key": record.key, "n": 4}).status_code == 404
 
@@ -69,7 +76,7 @@ def test_it_is_told_as_far_as_the_stream_tells_it(last):
     row = EpisodeRow(record.key, task_type=record.task_type, scene=record.scene, max_steps=9)
     manifest = RunDirectory.open(folder).manifest
     found = record_so_far(folder, manifest, row)
-    told = {"verb", "object_type", "success", "reward", "thought"}
+    told = {"verb", "object_type", "success", "reward", "thought", "feedback"}
     assert [each.model_dump(include=told) for each in found.steps[1:]] == [
         each.model_dump(include=told) for each in record.steps[1:3]
     ]

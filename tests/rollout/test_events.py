@@ -25,7 +25,7 @@ GOLDEN = r"""
 {"time":1.5,"kind":"run_begun","format":"er-gym/events/1","suite":"mini","agent":"random","tasks":3,"done":1}
 {"time":1.5,"kind":"episode_begun","task_id":"t","task_type":"single_search","scene":"FloorPlan1","instruction":"Find it.","max_steps":22}
 {"time":1.5,"kind":"reply","task_id":"t","step":1,"model":"m","seconds":0.5,"prompt_tokens":7,"completion_tokens":2,"cost":0.01,"cached":true}
-{"time":1.5,"kind":"step","task_id":"t","step":1,"verb":"open","object_type":"Fridge","success":true,"reward":-0.5,"thought":"hm"}
+{"time":1.5,"kind":"step","task_id":"t","step":1,"verb":"open","object_type":"Fridge","success":true,"reward":-0.5,"thought":"hm","feedback":"Done: open Fridge."}
 {"time":1.5,"kind":"episode_ended","task_id":"t","task_type":"single_search","success":false,"end_reason":"","total_reward":-0.5,"steps":1,"seconds":2.0,"error":"ValueError: no"}
 {"time":1.5,"kind":"cost","requests":4,"tokens":1000,"cost":0.25,"estimated":true}
 {"time":1.5,"kind":"run_ended","played":2,"crashed":1,"stopped":"KeyboardInterrupt: "}
@@ -60,6 +60,7 @@ EVENTS_OF_EACH_KIND = (
         success=True,
         reward=-0.5,
         thought="hm",
+        feedback="Done: open Fridge.",
     ),
     EpisodeEnded(
         time=1.5,
@@ -89,6 +90,16 @@ def test_the_lines_of_the_stream(tmp_path):
     log(tmp_path, *EVENTS_OF_EACH_KIND)
     assert (tmp_path / EVENTS).read_text() == GOLDEN + "\n"
     assert tuple(read_events(tmp_path)) == EVENTS_OF_EACH_KIND
+
+
+def test_a_stream_of_an_older_version_tells_less(tmp_path):
+    """It says no feedback and counts no side effects, which is not to count none of them."""
+    step, ended = EVENTS_OF_EACH_KIND[3], EVENTS_OF_EACH_KIND[4]
+    older = GOLDEN.splitlines()[3].replace(',"feedback":"Done: open Fridge."', "").encode()
+    assert list(parse_events([older])) == [step.model_copy(update={"feedback": ""})]
+    log(tmp_path, ended, tidy := ended.model_copy(update={"side_effects": 0}))
+    assert [each.side_effects for each in read_events(tmp_path)] == [None, 0]
+    assert tidy.model_dump_json()[:-1] == ended.model_dump_json()[:-1] + ',"side_effects":0'
 
 
 def test_no_stream_has_no_events(tmp_path):

@@ -59,8 +59,11 @@ def test_the_events_of_a_run_and_of_its_continuation(new, tasks, executor):
     _, begun, reply, step, ended, _ = first
     assert (begun.task_id, begun.max_steps, begun.instruction) == ("paper-0", 4, "Take the Apple.")
     assert (reply.step, reply.model, reply.cost) == (1, "m", 0.01)
+    record = new.episode("paper-0")
     assert (step.step, step.verb, step.thought) == (1, "end", "done")
+    assert step.feedback == record.steps[1].feedback != ""
     assert (ended.steps, ended.end_reason, ended.error) == (1, "end", "")
+    assert ended.side_effects == len(record.side_effects)
     assert heard == [first[0], *first[-2:]]  # steps and replies are in the stream only
     if executor == "processes":
         return  # what follows is the runner's, whatever executes it

@@ -6,14 +6,22 @@ from dataclasses import dataclass
 
 from fastapi import Request, Response
 
-from benchmarks.monitor.comparison import CHANGES, Pair, by_type, difference, pairs_of
+from benchmarks.monitor.comparison import (
+    CHANGES,
+    MEASURES,
+    Pair,
+    by_type,
+    difference,
+    measures_of,
+    pairs_of,
+)
 from benchmarks.monitor.directories import Directory
 from benchmarks.monitor.episode_view import EpisodeView, view_of
 from benchmarks.monitor.failures import FAILURES
 from benchmarks.monitor.listing import page_number, page_of
+from benchmarks.monitor.record_figures import SHOWN
 from benchmarks.monitor.settings_view import settings_of
 from benchmarks.monitor.site import NotFound, Routes, Site, or_nothing
-from benchmarks.scoring.metrics import METRICS
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.rollout.run_directory import RunDirectory
 
@@ -59,12 +67,18 @@ class ComparePages:
         chosen = asked.index(by) if by in asked[1:] else 1
         change = request.query_params.get("change", "")
         change = change if change in CHANGES else ""
+        counts = [self._site.failures(directory) for directory in directories]
+        means = [self._site.means(directory) for directory in directories]
+        measures = measures_of(rows for _, rows in runs)
+        measure = request.query_params.get("measure", "")
+        measure = measure if measure in measures else MEASURES[0]
         differences = [
-            (summary, difference("", pairs_of(runs[0][1], rows))) for summary, rows in runs[1:]
+            (summary, difference("", pairs_of(runs[0][1], rows, measure)))
+            for summary, rows in runs[1:]
         ]
         pairs: list[Pair] = []
         if len(runs) > 1:
-            pairs = pairs_of(runs[0][1], runs[chosen][1])
+            pairs = pairs_of(runs[0][1], runs[chosen][1], measure)
         flipped = [
             pair
             for pair in pairs
@@ -72,12 +86,16 @@ class ComparePages:
         ]
         flipped.sort(key=lambda pair: (CHANGES.index(pair.change), pair.key))
         settings = settings_of([summary for summary, _ in runs])
-        counts = [self._site.failures(directory) for directory in directories]
-        means = [self._site.means(directory) for directory in directories]
         variables = {
             "runs": [summary for summary, _ in runs],
             "means": means,
-            "metrics": METRICS if all(means) else (),
+            "metrics": [
+                name
+                for name in SHOWN
+                if all(means) and any(each.metrics.get(name) for each in means if each)
+            ],
+            "measure": measure,
+            "measures": measures,
             "scorer": CORRECTED.name,
             "failures": [
                 (kind, [counted.numbers[kind] for counted in counts])
