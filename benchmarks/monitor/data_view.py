@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from benchmarks.monitor.charts import as_svg
+from benchmarks.monitor.charts import as_svg, round_ticks
 from benchmarks.monitor.collection_index import CollectionIndex, TrajectoryHead
 from benchmarks.monitor.flow import flow
 from benchmarks.monitor.language import Translator
@@ -89,6 +89,7 @@ def overview(index: CollectionIndex, t: Translator) -> dict[str, Any]:
     states = {state: t.name(f"state_{state}") for state in STATES}
     longest = max(index.lengths, default=1)
     lengths = [(float(n), float(index.lengths[n])) for n in range(1, longest + 1)]
+    whole = [each for each in round_ticks(0.0, max(n for _, n in lengths)) if each == int(each)]
     return {
         "parts_counted": counted(Counter(head.part for head in heads)),
         "kinds": counted(Counter(head.kind for head in heads)),
@@ -115,7 +116,7 @@ def overview(index: CollectionIndex, t: Translator) -> dict[str, Any]:
         ),
         "lengths": as_svg("lengths", Chart(
             t("by_turns"), Axis(t("turns"), low=0.0, high=longest + 1.0),
-            Axis(t("trajectories"), low=0.0),
+            Axis(t("trajectories"), low=0.0, at=whole),
             [Series(t("trajectories"), points(lengths), "bars")],
         )) if heads else "",
     }  # fmt: skip

@@ -17,7 +17,7 @@ def percent(rate: float | None) -> str:
 
 def signed(rate: float) -> str:
     """A difference of fractions in percentage points, with its sign."""
-    return f"{100 * rate:+.1f}"
+    return f"{100 * rate:+.1f}".replace("-", "−")
 
 
 def chance(p: float) -> str:
@@ -77,11 +77,12 @@ def brief(text: str) -> str:
 
 
 def path(text: str) -> Markup:
-    """As :func:`brief`, for a path: it may be parted behind each slash."""
-    return Markup("/<wbr>").join(brief(text).split("/"))
+    """As :func:`brief`, for a path or a name: it may be parted behind each slash and underscore."""
+    return Markup("<wbr>").join(_PARTED.split(brief(text)))
 
 
 _PIECE = 4_000
+_PARTED = re.compile("(?<=[/_])(?=[^/_])")
 _MARK = "[\u0300-\u036f\u0483-\u0489\u1ab0-\u1aff\u1dc0-\u1dff\u20d0-\u20ff\ufe20-\ufe2f]"
 _MARKS = re.compile(f"(?<={_MARK}{{4}}){_MARK}+")
 """Combining marks beyond the fourth in a row."""

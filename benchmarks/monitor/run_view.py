@@ -186,6 +186,8 @@ class RunView:
             state = "playing" if self._is_played(now - tail.time) else "stopped"
         since = [row for row in rows if row.ended is not None and row.ended >= tail.begun]
         spent = tail.time - tail.begun
+        # A start that found nothing to play says nothing of the speed.
+        last = max((row.ended for row in rows if row.ended), default=tail.time)
         left = None
         if state == "playing" and since and spent > 0:
             left = (wanted - finished) * spent / len(since)
@@ -199,7 +201,7 @@ class RunView:
             counts=counts,
             success=SuccessCount.of("", rows),
             spent=self.spending.spent or _of_replies(rows),
-            decisions_per_second=_speed(rows, tail.time),
+            decisions_per_second=_speed(rows, tail.time if state == "playing" else last),
             seconds_left=left,
             begun=min((row.begun for row in rows if row.begun), default=tail.begun),
             samples=max((row.sample for row in rows), default=0),

@@ -73,7 +73,7 @@ def _told(run: RunSummary) -> dict[str, str]:
         for name, value in _USUAL.items()
         if not any(f"{each}.".startswith(f"{name}.") for each in stated)
     }
-    return {name: str(value) for name, value in (usual | stated).items()} | {
+    return {name: str(value) or '""' for name, value in (usual | stated).items()} | {
         "samples": str(run.samples),
         "set_aside": str(len(manifest.set_aside)),
         "scorer": CORRECTED.name,

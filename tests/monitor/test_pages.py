@@ -316,7 +316,7 @@ def test_runs_are_compared_task_by_task(client, ids, runs):
     assert other_way == f"?of={ids['oracle']}&of={ids['random']}"
     turned = client.get(f"/compare{other_way}").text
     assert turned.index(f'value="{ids["oracle"]}"') < turned.index(f'value="{ids["random"]}"')
-    assert f"{100 * (lost - 8) / 8:+.1f}" in said(turned)
+    assert f"−{100 * (8 - lost) / 8:.1f}" in said(turned)
 
 
 def test_settings_are_shown_and_compared_runs_that_were_not_played_alike_are_named(
@@ -336,7 +336,7 @@ def test_settings_are_shown_and_compared_runs_that_were_not_played_alike_are_nam
     assert re.search(r"begun 20\d\d-", page)
     both = client.get("/compare", params={"of": [ids["random"], ids["oracle"]]})
     text = " ".join(said(both.text).split())
-    assert "not played alike: env.instances, env.faults. So" in text
+    assert "not played alike: env.instances (explore / target), env.faults (0.2 / 0.0). So" in text
     assert "env.width 640 800" in text
     assert "seed 0 0" not in text
     alike = client.get("/compare", params={"of": [ids["oracle"], ids["oracle"]]})

@@ -103,7 +103,7 @@ class ComparePages:
                 if any(counted.numbers[kind] for counted in counts)
             ],
             "settings": settings,
-            "unlike": [one.name for one in settings if one.differs and one.matters],
+            "unlike": [one for one in settings if one.differs and one.matters],
             "counted": [(counted.done, counted.failed) for counted in counts],
             # Those that are compared, in their order: the form keeps the first one the first.
             "every": [
@@ -121,6 +121,7 @@ class ComparePages:
             "changes": CHANGES,
             "page": page_of(flipped, page_number(request.query_params)),
             "live": ",".join(asked),
+            "at": "runs",
         }
         return self._site.show(request, "compare.html", variables)
 
@@ -142,6 +143,7 @@ class ComparePages:
                 for directory, run, view in zip(directories, runs, views, strict=True)
             ],
             "parts_at": parts_at,
+            "at": "runs",
             "scripts": ("episode.js", "enlarge.js"),
         }
         return self._site.show(request, "compare_episode.html", variables)

@@ -63,6 +63,7 @@ class EpisodePages(ReplayPages):
             "before": before,
             "after": after,
             "note": row.note if row else None,
+            "at": "runs",
             "scripts": ("episode.js", "enlarge.js", "notes.js"),
         }
         return self._site.show(request, "episode.html", variables)
@@ -87,6 +88,7 @@ class EpisodePages(ReplayPages):
                 each.path: address + urlencode({"key": key, "n": number})
                 for number, each in enumerate(episode.pictures)
             },
+            "at": "runs",
             "scripts": ("enlarge.js",),
         }
         return self._site.show(request, "request.html", variables)
@@ -108,6 +110,7 @@ class EpisodePages(ReplayPages):
             "filter": chosen,
             "why": "" if row.ended is None else why,
             "live": directory.id,
+            "at": "runs",
         }
         return self._site.show(request, "episode_under_way.html", variables)
 

@@ -87,7 +87,7 @@ class PlayPages:
     ) -> Response:
         """The choice of what to play."""
         if self._folder is None:
-            return self._site.show(request, "play.html", {"on": False, "problem": ""})
+            return self._site.show(request, "play.html", {"on": False, "problem": "", "at": "play"})
         return self._choice(request, {"suite": suite, "type": type, "agent": agent})
 
     def _choice(
@@ -126,7 +126,7 @@ class PlayPages:
             "folder": self._folder,
         }
         return self._site.show(
-            request, "play.html", variables | {"scripts": ("choose.js",)}, status
+            request, "play.html", variables | {"at": "play", "scripts": ("choose.js",)}, status
         )
 
     async def begin(self, request: Request) -> Response:
@@ -191,6 +191,7 @@ class PlayPages:
             "problem": problem,
             "secret": self._forms.secret,
             "directory": self._site.directories.at(run, "run"),
+            "at": "play",
             "scripts": ("play.js", "enlarge.js"),
         }
         return self._site.show(request, "play_session.html", variables, status)

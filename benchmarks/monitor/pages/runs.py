@@ -94,5 +94,5 @@ class RunPages:
             view.read_records(_FILTER_SECONDS if chosen.failure else READ_SECONDS)
             variables = run_variables(view, chosen, self._site.translator(request))
         return self._site.show(
-            request, "run.html", {**variables, "live": id, "scripts": ("notes.js",)}
+            request, "run.html", {**variables, "live": id, "at": "runs", "scripts": ("notes.js",)}
         )
