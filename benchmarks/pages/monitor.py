@@ -6,8 +6,8 @@
 The first command takes whole pages, at three widths, light and dark, in English and Chinese, to be
 looked at after a change; it says which are wider than the window. The second one takes pictures as
 ``docs/monitor.md`` has them. Of each kind of directory in FOLDER the first one is shown; the first
-run is compared with the last one of the same tasks. Playing writes into a folder of its own, which
-goes away.
+run is compared with those of the same tasks. Playing writes into a folder of its own, which goes
+away.
 """
 
 from __future__ import annotations
@@ -73,11 +73,13 @@ class Shown:
             return trajectory.id
         raise LookupError
 
-    def two_runs(self) -> list[tuple[str, str]]:
-        """The first run and the last one that has played the same."""
-        first, key = self.of("run")[0], self.key()
+    def alike(self) -> list[tuple[str, str]]:
+        """The first run and all that have played the same, as an address asks for them."""
+        key = self.key()
         alike = [each for each in self.of("run") if RunDirectory.open(each.path).has(key)]
-        return [("of", first.id), ("of", alike[1:][-1].id)]
+        if len(alike) < 2:
+            raise LookupError
+        return [("of", each.id) for each in alike]
 
     def exported(self) -> str:
         """The first run as a file."""
@@ -153,10 +155,10 @@ KINDS: Mapping[str, PageKind] = {
         lambda shown: f"{shown.at('runs', 'run')}/episode?{urlencode({'key': shown.key()})}#step-1",
         ready=_MAP,
     ),
-    "compare": PageKind(lambda shown: f"/compare?{urlencode(shown.two_runs())}"),
+    "compare": PageKind(lambda shown: f"/compare?{urlencode(shown.alike())}"),
     "compare-episode": PageKind(
         lambda shown: (
-            f"/compare/episode?{urlencode([*shown.two_runs(), ('key', shown.key())])}#a-step-1"
+            f"/compare/episode?{urlencode([*shown.alike()[:: len(shown.alike()) - 1], ('key', shown.key())])}#a-step-1"
         ),
         ready="svg.room >> nth=1",
     ),

@@ -296,6 +296,12 @@ def test_an_agent_with_a_plan_of_its_own_is_only_watched(player: Player) -> None
     assert player.run("human+searcher").episode(FIRST.id).success
 
 
+def test_an_agent_without_thoughts_is_watched(player: Player) -> None:
+    session = player.begin(agent="random")
+    assert player.post(session, do="step").status_code == 303
+    assert player.get(session).count("<li value=") == 1
+
+
 @pytest.mark.parametrize(
     ("fields", "origin", "status"),
     [

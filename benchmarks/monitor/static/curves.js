@@ -19,8 +19,11 @@ if (board) {
       return sum / norm;
     });
   };
-  const written = (tick) =>
-    tick == null ? "" : Math.abs(tick) >= 1e5 ? new Intl.NumberFormat("en", { notation: "compact", maximumFractionDigits: 3 }).format(tick) : String(Number(tick.toPrecision(6)));
+  const compact = new Intl.NumberFormat("en", { notation: "compact", maximumFractionDigits: 3 });
+  const written = (ticks) => {
+    const large = Math.max(...ticks.map((tick) => Math.abs(tick ?? 0))) >= 1e4;
+    return ticks.map((tick) => (tick == null ? "" : large ? compact.format(tick) : String(Number(tick.toPrecision(6)))));
+  };
   const at = (xs, ys, x) => {
     if (x < xs[0] || x > xs[xs.length - 1]) return null;
     let high = xs.findIndex((each) => each >= x);
@@ -93,7 +96,7 @@ if (board) {
         // All charts show the same place, but each is zoomed by itself.
         cursor: { sync: { key: "curves", filters: { pub: (kind) => /^mouse(move|leave)$/.test(kind) } }, drag: { x: true, y: true, uni: 30 } },
         scales: { x: { time: false, distr: controls.logx.checked ? 3 : 1 }, y: { distr: controls.logy.checked ? 3 : 1 } },
-        axes: [{ ...axis }, { ...axis, size: 64, values: (self, ticks) => ticks.map(written) }],
+        axes: [{ ...axis, values: (self, ticks) => written(ticks) }, { ...axis, size: 64, values: (self, ticks) => written(ticks) }],
       }, uPlot.join(tables), place);
       // The ends of a range need no place in the legend.
       for (const band of bands) for (const number of band.series) chart.root.querySelectorAll(".u-series")[number].hidden = true;
