@@ -20,11 +20,13 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode, urljoin
 
 import click
+from PIL import Image
 
 from benchmarks.harness.processes import ER_GYM
 from benchmarks.monitor.directories import Directories, Directory, Kind
@@ -96,6 +98,18 @@ def _play(page: Any) -> None:
     page.wait_for_selector("button[name=action]")
 
 
+def _look_around(page: Any) -> None:
+    _play(page)
+    page.click("button[value=observe]")
+    page.wait_for_selector(".views.n4")
+    page.evaluate("scrollTo(0, 0)")
+
+
+def _pool(page: Any) -> None:
+    page.check("[name=pool]")
+    page.locator("[name=smooth]").fill("0.5")
+
+
 def _play_to_the_end(page: Any) -> None:
     _play(page)
     page.click("button[value=end]")
@@ -146,6 +160,12 @@ def _curves(shown: Shown) -> str:
     return f"/training/curves?{urlencode(of)}" if of else shown.at("training", "policy")
 
 
+def _two_episodes(shown: Shown) -> str:
+    runs = shown.alike()
+    asked = urlencode([runs[0], runs[-1], ("key", shown.key())])
+    return f"/compare/episode?{asked}#a-step-1"
+
+
 _MAP = "svg.room, .map .empty"
 KINDS: Mapping[str, PageKind] = {
     "runs": PageKind(lambda shown: "/"),
@@ -156,12 +176,7 @@ KINDS: Mapping[str, PageKind] = {
         ready=_MAP,
     ),
     "compare": PageKind(lambda shown: f"/compare?{urlencode(shown.alike())}"),
-    "compare-episode": PageKind(
-        lambda shown: (
-            f"/compare/episode?{urlencode([*shown.alike()[:: len(shown.alike()) - 1], ('key', shown.key())])}#a-step-1"
-        ),
-        ready="svg.room >> nth=1",
-    ),
+    "compare-episode": PageKind(_two_episodes, ready="svg.room >> nth=1"),
     "exported": PageKind(lambda shown: shown.exported()),
     "data": PageKind(lambda shown: "/data"),
     "collection": PageKind(lambda shown: shown.at("data", "collection")),
@@ -177,9 +192,9 @@ KINDS: Mapping[str, PageKind] = {
     "reinforcement": PageKind(lambda shown: shown.at("training", "reinforcement")),
     "ladder": PageKind(lambda shown: shown.at("training", "ladder")),
     "ablation": PageKind(lambda shown: shown.at("training", "ablation")),
-    "curves": PageKind(_curves, ready="#curves canvas"),
+    "curves": PageKind(_curves, ready="#curves canvas", before=_pool),
     "choose": PageKind(lambda shown: "/play"),
-    "play": PageKind(lambda shown: "/play", before=_play),
+    "play": PageKind(lambda shown: "/play", before=_look_around),
     "played": PageKind(lambda shown: "/play", before=_play_to_the_end),
     "watched": PageKind(lambda shown: "/play", before=_watch),
     "nothing": PageKind(lambda shown: "/nothing"),
@@ -228,11 +243,17 @@ def main(
                     page.wait_for_selector(KINDS[name].ready)
                     with KINDS[name].during(page):
                         if docs:
-                            page.screenshot(path=out / f"monitor-{name}.png")
+                            _small(page.screenshot(), out / f"monitor-{name}.png")
                             continue
                         for wide in width:
                             _whole(page, wide, out / f"{name}-{wide}-{colours}-{words}.png")
             context.close()
+
+
+def _small(picture: bytes, file: Path) -> None:
+    """Keep a picture in 256 colours."""
+    image = Image.open(BytesIO(picture)).convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    image.save(file, optimize=True)
 
 
 def _whole(page: Any, width: int, file: Path) -> None:
@@ -248,8 +269,9 @@ def _whole(page: Any, width: int, file: Path) -> None:
 @contextlib.contextmanager
 def _served(folder: Path) -> Iterator[str]:
     """The monitor over a folder; yields its address."""
-    with tempfile.TemporaryDirectory() as played:
-        command = [*ER_GYM, "ui", str(folder), "--no-browser", "--port", "0", "--play", played]
+    with tempfile.TemporaryDirectory() as scratch:
+        command = [*ER_GYM, "ui", str(folder), "--no-browser", "--port", "0"]
+        command += ["--play", f"{scratch}/played"]
         server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         assert server.stdout is not None
         try:

@@ -28,6 +28,7 @@ from benchmarks.monitor.episode_filter import Filter
 from benchmarks.monitor.failures import FAILURES, Failure, failure_of
 from benchmarks.monitor.language import words_in
 from benchmarks.monitor.site import Site
+from benchmarks.pages.monitor import KINDS, Shown
 from benchmarks.scoring.metrics import METRICS, score_episode, summarise
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.rollout.run_directory import SERVER_EVENTS, SPENDING, RunDirectory
@@ -367,3 +368,12 @@ def test_another_machine_needs_the_token(runs):
         assert client.get("/").status_code == 200
     with TestClient(make_app([runs], ""), base_url="http://rebound.example:8010") as client:
         assert client.get("/").status_code == 403
+
+
+def test_the_pictures_that_are_taken_of_pages_are_of_pages(runs, visit, tmp_path):
+    shown, client = Shown(runs, tmp_path), visit(runs)
+    for kind in ("runs", "run", "episode", "compare", "compare-episode", "data", "choose"):
+        assert client.get(KINDS[kind].address(shown)).status_code == 200, kind
+    for kind in ("collection", "policy", "ladder", "curves"):
+        with pytest.raises(LookupError):
+            KINDS[kind].address(shown)
