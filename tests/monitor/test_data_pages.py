@@ -61,7 +61,7 @@ def address(folder: Path) -> str:
 
 
 def said(text: str) -> str:
-    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text)).split())
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text.replace("<wbr>", ""))).split())
 
 
 def rows(text: str) -> list[str]:

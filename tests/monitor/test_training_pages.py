@@ -23,7 +23,7 @@ from er_gym.locking import LOCK, exclusive_use
 
 
 def said(text: str) -> str:
-    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text)).split())
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text.replace("<wbr>", ""))).split())
 
 
 def make_plan(plan: Plan, folder: Path, done: int) -> None:
