@@ -102,7 +102,6 @@ def _look_around(page: Any) -> None:
     _play(page)
     page.click("button[value=observe]")
     page.wait_for_selector(".views.n4")
-    page.evaluate("scrollTo(0, 0)")
 
 
 def _pool(page: Any) -> None:
@@ -114,7 +113,6 @@ def _play_to_the_end(page: Any) -> None:
     _play(page)
     page.click("button[value=end]")
     page.wait_for_selector("p.result")
-    page.evaluate("scrollTo(0, 0)")
 
 
 def _watch(page: Any) -> None:
@@ -242,6 +240,7 @@ def main(
                     KINDS[name].before(page)
                     page.wait_for_selector(KINDS[name].ready)
                     with KINDS[name].during(page):
+                        page.evaluate("scrollTo(0, 0)")
                         if docs:
                             _small(page.screenshot(), out / f"monitor-{name}.png")
                             continue
