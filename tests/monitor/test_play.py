@@ -290,6 +290,7 @@ def test_an_agent_with_a_plan_of_its_own_is_only_watched(player: Player) -> None
     assert refused.status_code == 409
     assert WORDS["play_cannot_yield"].format(agent="searcher") in refused.text
     assert player.post(session, do="step").status_code == 303
+    assert player.wait_for(session, "<li value=")
     assert player.get(session).count("<li value=") == 1
     assert player.post(session, do="go").status_code == 303
     assert player.wait_for(session, WORDS["play_success"])
@@ -299,6 +300,7 @@ def test_an_agent_with_a_plan_of_its_own_is_only_watched(player: Player) -> None
 def test_an_agent_without_thoughts_is_watched(player: Player) -> None:
     session = player.begin(agent="random")
     assert player.post(session, do="step").status_code == 303
+    assert player.wait_for(session, "<li value=")
     assert player.get(session).count("<li value=") == 1
 
 
