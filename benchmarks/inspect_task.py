@@ -59,7 +59,6 @@ from agents.vlm.settings import AgentSettings
 from benchmarks.inspect_secrets import without_secrets
 from benchmarks.scoring.metrics import METRICS, score_episode
 from benchmarks.scoring.scorers import CORRECTED
-from benchmarks.vlm_run import env_of
 from er_gym.rollout.causes import CONTEXT, causes_in, count_causes
 from er_gym.rollout.env_pool import EnvPool
 from er_gym.rollout.play import episode_seed, play_episode
@@ -95,7 +94,7 @@ def er_gym(
     given = (overrides,) if isinstance(overrides, str) else tuple(overrides)
     settings = load_settings(agent_config, given)
     asked = load_suite(suite)
-    env = {"backend": "embedded", **asked.env, **env_of(settings)}
+    env = {"backend": "embedded", **asked.env, **settings.env}
     tasks = resolve_tasks(asked.tasks, env["backend"]).tasks
     chosen = {each.id: each for each in tasks[:limit]}
     return InspectTask(

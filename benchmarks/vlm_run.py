@@ -23,13 +23,6 @@ from er_gym.tasks.task import Task
 _CONCURRENCY = 8
 
 
-def env_of(settings: AgentSettings) -> dict[str, Any]:
-    """The environment's arguments that an agent's settings ask for."""
-    size = {"width": settings.pictures.width, "height": settings.pictures.height}
-    wanted = {name: pixels for name, pixels in size.items() if pixels is not None}
-    return {**wanted, "obs_mode": settings.obs_mode}
-
-
 @dataclass(frozen=True)
 class VLMRun:
     """A run with a vision-language agent.
@@ -87,7 +80,7 @@ class VLMRun:
     @property
     def env(self) -> dict[str, Any]:
         """The environment's arguments that it asks for."""
-        return env_of(self.settings)
+        return self.settings.env
 
     def factory(self, run: Path) -> AgentFactory:
         """What makes the agents of a run; it keeps replies and bills in the run directory."""

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
+from PIL import Image
 from torch.utils.data import Dataset, Sampler
 
-from agents.finetune.settings import DataSettings
 from agents.finetune.tokens import EncodedChat, expanded
+from agents.vlm.pictures import patches_of
 from er_gym.data.pictures import open_picture
 from er_gym.data.trajectory import PictureRecord
 
@@ -85,7 +87,7 @@ class Collator:
 
     Attributes:
         image_processor, image_token: the model's; None where it does not see.
-        settings: bounds of pictures.
+        bounds: the least and the most pixels of a picture; one with fewer or more is scaled.
         padding: the token that fills rows up.
         multiple: the length of a batch is one of its multiples. On a CPU, libraries prepare for
             each length anew and keep that: with few lengths, they take less memory.
@@ -93,37 +95,57 @@ class Collator:
 
     image_processor: Any
     image_token: int | None
-    settings: DataSettings
+    bounds: tuple[int, int]
     padding: int
     multiple: int = 1
 
     def __call__(self, chats: Sequence[EncodedChat]) -> dict[str, Any]:
-        """A batch.
+        """A batch of conversations, whose pictures are read.
 
         Returns:
-            ``input_ids`` and ``labels`` (conversations, longest), labels -100 where there is no
-            loss; ``tokens``, how many are no padding; with pictures, ``pixel_values`` (patches,
-            values of a patch), ``image_grid_thw`` (pictures, 3) and ``mm_token_type_ids``
-            (conversations, longest), 1 for a picture's token.
+            as :meth:`of_rows`; and ``tokens``, how many are no padding.
 
         Raises:
             ValueError: a picture cannot be read, or is not of its record's size.
         """
         rows = [expanded(chat, self.image_token) for chat in chats]
-        longest = max(len(ids) for ids, _ in rows)
+        batch = self.of_rows(rows, [_read(each) for chat in chats for each in chat.pictures])
+        if "image_grid_thw" in batch:
+            ids, labels, grids = (batch[name] for name in ("input_ids", "labels", "image_grid_thw"))
+            self._learn_cells(chats, ids, labels, grids)
+        return {**batch, "tokens": sum(len(ids) for ids, _ in rows)}
+
+    def of_rows(
+        self,
+        rows: Sequence[tuple[NDArray[np.int64], NDArray[np.int64]]],
+        pictures: Sequence[Image.Image],
+    ) -> dict[str, Any]:
+        """A batch of rows of tokens; without rows, one of padding.
+
+        Args:
+            rows: (length,) ids and (length,) labels of each. A picture has all of its tokens.
+            pictures: of all rows, in order, RGB.
+
+        Returns:
+            ``input_ids`` and ``labels`` (rows, longest), labels -100 where there is no loss; with
+            pictures, ``pixel_values`` (patches, values of a patch), ``image_grid_thw`` (pictures,
+            3) and ``mm_token_type_ids`` (rows, longest), 1 for a picture's token.
+        """
+        longest = max((len(ids) for ids, _ in rows), default=1)
         longest += -longest % self.multiple
-        ids = torch.full((len(rows), longest), self.padding)
-        labels = torch.full((len(rows), longest), -100)
+        ids = torch.full((max(len(rows), 1), longest), self.padding)
+        labels = torch.full_like(ids, -100)
         for row, (tokens, wanted) in enumerate(rows):
             ids[row, : len(tokens)] = torch.from_numpy(tokens)
             labels[row, : len(tokens)] = torch.from_numpy(wanted)
-        count = sum(len(tokens) for tokens, _ in rows)
-        batch: dict[str, Any] = {"input_ids": ids, "labels": labels, "tokens": count}
-        pictures = [picture for chat in chats for picture in chat.pictures]
+        batch: dict[str, Any] = {"input_ids": ids, "labels": labels}
         if pictures and self.image_token is not None:
-            batch |= self._pixels(pictures)
-            batch["mm_token_type_ids"] = ids.eq(self.image_token).int()
-            self._learn_cells(chats, ids, labels, batch["image_grid_thw"])
+            pixels, grids = patches_of(self.image_processor, pictures, self.bounds)
+            batch |= {
+                "pixel_values": pixels,
+                "image_grid_thw": grids,
+                "mm_token_type_ids": ids.eq(self.image_token).int(),
+            }
         return batch
 
     def _learn_cells(
@@ -146,23 +168,17 @@ class Collator:
                     labels[row, places[start : start + count] + 1] = said
                 start += count
 
-    def _pixels(self, pictures: Sequence[PictureRecord]) -> dict[str, Any]:
-        """Pictures as patches, exactly as agents/vlm/clients/local.py makes them at play."""
-        images = []
-        for record in pictures:
-            image = open_picture(Path(record.path))
-            if image.size != (record.width, record.height):
-                raise ValueError(
-                    f"{record.path} is {image.width} × {image.height} pixels, but "
-                    f"its record says {record.width} × {record.height}; collect the data again"
-                )
-            images.append(image)
-        bounds = {
-            "shortest_edge": self.settings.min_pixels,
-            "longest_edge": self.settings.max_pixels,
-        }
-        seen = self.image_processor(images, size=bounds, return_tensors="pt")
-        return {
-            "pixel_values": seen["pixel_values"],
-            "image_grid_thw": seen["image_grid_thw"],
-        }
+
+def _read(record: PictureRecord) -> Image.Image:
+    """A picture of a record.
+
+    Raises:
+        ValueError: it cannot be read, or is not of the record's size.
+    """
+    image = open_picture(Path(record.path))
+    if image.size != (record.width, record.height):
+        raise ValueError(
+            f"{record.path} is {image.width} × {image.height} pixels, but its record says "
+            f"{record.width} × {record.height}; collect the data again"
+        )
+    return image

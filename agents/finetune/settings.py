@@ -97,6 +97,11 @@ class DataSettings(StrictSettings):
             )
         return self
 
+    @property
+    def bounds(self) -> tuple[int, int]:
+        """The least and the most pixels of a picture."""
+        return self.min_pixels, self.max_pixels
+
     def takes(self, part: str, kind: str) -> bool:
         """Whether a trajectory of this part and kind is used."""
         return (not self.parts or part in self.parts) and (not self.kinds or kind in self.kinds)

@@ -224,7 +224,7 @@ def _train(
         data_collator=Collator(
             files.image_processor,
             image_token,
-            settings.data,
+            settings.data.bounds,
             padding,
             multiple=1 if machine.on_gpu() else _CPU_LENGTHS,
         ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from agents.vlm.chat import Picture
 from er_gym.rollout.records import EpisodeRecord, StepRecord
 
 
@@ -19,12 +20,14 @@ class Turn:
             sampler does not tell.
         anchor: a digest of what the agent had observed and done before
             (:func:`er_gym.envs.observations.anchor_of`).
+        pictures: those of the prompt, in order, as the model was sent them.
     """
 
     prompt: Sequence[int]
     said: Sequence[int]
     scores: Sequence[float]
     anchor: str
+    pictures: Sequence[Picture] = ()
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import accelerate
 import numpy as np
 import torch
 
+from agents.finetune.batches import Collator
 from agents.finetune.loop import LearntOnly
 from agents.finetune.optimizer import MuonAdamW
 from agents.reinforce.objective import TokenScores, losses, token_scores
@@ -28,8 +29,7 @@ class Learner:
             network without its adapter.
         settings: of the run.
         accelerator: spreads the work over processes and devices.
-        padding: a token that fills rows up.
-        multiple: of the length of batches.
+        collator: makes batches, with the model's pictures.
         rounded: whether it is multiplied in bfloat16.
 
     Attributes:
@@ -42,13 +42,12 @@ class Learner:
         start: Any,
         settings: ReinforceSettings,
         accelerator: accelerate.Accelerator,
+        collator: Collator,
         *,
-        padding: int,
-        multiple: int = 1,
         rounded: bool = False,
     ) -> None:
         self._settings, self._accelerator = settings, accelerator
-        self._padding, self._multiple, self._rounded = padding, multiple, rounded
+        self._collator, self._rounded = collator, rounded
         self._inner, self._start = network, start
         self._learnt_only = LearntOnly(network)
         self._start_only = None if start is None else LearntOnly(start)
@@ -139,13 +138,8 @@ class Learner:
 
     def _scores(self, batch: Batch) -> TokenScores:
         with self._learnt_only.at(batch.labels), self._multiplied():
-            logits = self._network(input_ids=batch.ids, use_cache=False).logits[0]
-        return token_scores(
-            logits,
-            batch.wanted,
-            self._settings.play.temperature,
-            of_entropy=bool(self._settings.objective.entropy),
-        )
+            logits = self._network(**batch.inputs, use_cache=False).logits[0]
+        return self._of_tokens(logits, batch, of_entropy=bool(self._settings.objective.entropy))
 
     @torch.no_grad()
     def _scores_at_start(self, batch: Batch) -> torch.Tensor:
@@ -158,8 +152,19 @@ class Learner:
                 stack.enter_context(network.disable_adapter())
                 stack.enter_context(self._learnt_only.at(batch.labels))
             stack.enter_context(self._multiplied())
-            logits = network(input_ids=batch.ids, use_cache=False).logits[0]
-        return token_scores(logits, batch.wanted, self._settings.play.temperature).chance
+            logits = network(**batch.inputs, use_cache=False).logits[0]
+        return self._of_tokens(logits, batch).chance
+
+    def _of_tokens(
+        self, logits: torch.Tensor, batch: Batch, *, of_entropy: bool = False
+    ) -> TokenScores:
+        return token_scores(
+            logits,
+            batch.wanted,
+            self._settings.play.temperature,
+            never=self._collator.image_token,
+            of_entropy=of_entropy,
+        )
 
     @torch.no_grad()
     def _scored_again(self, rows: Sequence[Row]) -> list[Row]:
@@ -181,7 +186,7 @@ class Learner:
             yield self._batch(rows, places)
 
     def _batch(self, rows: Sequence[Row], places: Sequence[int]) -> Batch:
-        made = batch_of([rows[place] for place in places], self._padding, self._multiple)
+        made = batch_of([rows[place] for place in places], self._collator)
         return made.on(self._accelerator.device)
 
     def _multiplied(self) -> torch.autocast:

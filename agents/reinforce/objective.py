@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import torch
 
 from agents.reinforce.settings import ObjectiveSettings
+from agents.vlm.clients.seeded_sampling import never_drawn
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,12 @@ class TokenScores:
 
 
 def token_scores(
-    logits: torch.Tensor, wanted: torch.Tensor, temperature: float, *, of_entropy: bool = False
+    logits: torch.Tensor,
+    wanted: torch.Tensor,
+    temperature: float,
+    *,
+    never: int | None = None,
+    of_entropy: bool = False,
 ) -> TokenScores:
     """The scores of tokens.
 
@@ -31,9 +37,13 @@ def token_scores(
         logits: (learnt tokens, words) from which each token was drawn.
         wanted: (learnt tokens,) the tokens.
         temperature: at which they were drawn.
+        never: a token that is never drawn; None if any may be.
         of_entropy: whether the entropy has a gradient, which takes memory.
     """
-    chances = (logits.float() / temperature).log_softmax(dim=1)
+    scores = logits.float() / temperature
+    if never is not None:
+        never_drawn(scores, never)
+    chances = scores.log_softmax(dim=1)
     with torch.set_grad_enabled(torch.is_grad_enabled() and of_entropy):
         entropy = -(chances.exp() * chances).sum(dim=1)
     return TokenScores(chances.gather(1, wanted[:, None])[:, 0], entropy)

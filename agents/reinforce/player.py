@@ -81,7 +81,7 @@ class Player:
     def turns(self) -> tuple[Turn, ...]:
         """What the model said; without a turn in which it gave no reply."""
         return tuple(
-            Turn(spoken.prompt, spoken.said, spoken.scores, anchor)
+            Turn(spoken.prompt, spoken.said, spoken.scores, anchor, spoken.pictures)
             for spoken, anchor in zip(self._listener.heard, self.anchors, strict=False)
         )
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from agents.finetune.batches import Collator
 from agents.reinforce.episodes import Turn
+from agents.vlm.chat import Picture
+from er_gym.data.pictures import open_picture
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,7 @@ class Row:
         advantage: (tokens,) float32.
         weight: (tokens,) float32, how much a token counts among those of an update.
         scores: (tokens,) float32, the logarithm of the probability at play; NaN if unknown.
+        pictures: in order, as files in memory: their patches would take thirty times as much.
     """
 
     ids: NDArray[np.int64]
@@ -30,6 +34,19 @@ class Row:
     advantage: NDArray[np.float32]
     weight: NDArray[np.float32]
     scores: NDArray[np.float32]
+    pictures: tuple[Picture, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A part of a row whose tokens are alike: what is new of a prompt, or a reply."""
+
+    ids: Sequence[int]
+    learnt: bool
+    advantage: float
+    weight: float
+    scores: Sequence[float]
+    pictures: Sequence[Picture] = ()
 
 
 def rows_of(
@@ -41,9 +58,9 @@ def rows_of(
 ) -> list[Row]:
     """An episode as rows.
 
-    A turn whose prompt begins with all tokens of the turn before goes on in its row, so that what
-    came before is computed once. Where it does not, as when a client left out earlier pictures or
-    the words that were drawn are usually written in other tokens, a row begins.
+    A turn whose prompt begins with all tokens and pictures of the turn before goes on in its row,
+    so that what came before is computed once. Where it does not, as when a client left out earlier
+    pictures or the words that were drawn are usually written in other tokens, a row begins.
 
     Args:
         turns: of the episode.
@@ -56,33 +73,36 @@ def rows_of(
     """
     learns = [bool(advantage) or keep_all for advantage in advantages]
     tokens = sum(len(turn.said) for turn, wanted in zip(turns, learns, strict=True) if wanted)
-    every: list[list[tuple[list[int], bool, float, float, Sequence[float]]]] = []
+    every: list[list[_Piece]] = []
     ids: list[int] = []
+    seen: list[Picture] = []
     for turn, advantage, wanted in zip(turns, advantages, learns, strict=True):
-        prompt, said = list(turn.prompt), list(turn.said)
-        if not every or prompt[: len(ids)] != ids:
+        prompt, said, pictures = list(turn.prompt), list(turn.said), list(turn.pictures)
+        if not every or prompt[: len(ids)] != ids or pictures[: len(seen)] != seen:
             every.append([])
-            ids = []
+            ids, seen = [], []
         weight = {"token": 1.0, "turn": 1 / len(said), "episode": 1 / max(tokens, 1)}[mean]
         new = prompt[len(ids) :]
-        every[-1].append((new, False, 0.0, 0.0, [0.0] * len(new)))
-        every[-1].append((said, wanted, advantage, weight, turn.scores or [np.nan] * len(said)))
-        ids = prompt + said
+        scores = turn.scores or [np.nan] * len(said)
+        every[-1].append(_Piece(new, False, 0.0, 0.0, [0.0] * len(new), pictures[len(seen) :]))
+        every[-1].append(_Piece(said, wanted, advantage, weight, scores))
+        ids, seen = prompt + said, pictures
     return [row for pieces in every if (row := _row(pieces)) is not None]
 
 
-def _row(pieces: Sequence[tuple[list[int], bool, float, float, Sequence[float]]]) -> Row | None:
-    last = max((place for place, piece in enumerate(pieces) if piece[1]), default=None)
+def _row(pieces: Sequence[_Piece]) -> Row | None:
+    last = max((place for place, piece in enumerate(pieces) if piece.learnt), default=None)
     if last is None:
         return None
     kept = pieces[: last + 1]
-    sizes = [len(ids) for ids, *_ in kept]
+    sizes = [len(piece.ids) for piece in kept]
     return Row(
-        ids=np.concatenate([np.array(ids, np.int64) for ids, *_ in kept]),
-        learnt=np.repeat([learnt for _, learnt, *_ in kept], sizes),
-        advantage=np.repeat([advantage for _, _, advantage, *_ in kept], sizes).astype(np.float32),
-        weight=np.repeat([weight for _, _, _, weight, _ in kept], sizes).astype(np.float32),
-        scores=np.concatenate([np.array(scores, np.float32) for *_, scores in kept]),
+        ids=np.concatenate([np.array(piece.ids, np.int64) for piece in kept]),
+        learnt=np.repeat([piece.learnt for piece in kept], sizes),
+        advantage=np.repeat([piece.advantage for piece in kept], sizes).astype(np.float32),
+        weight=np.repeat([piece.weight for piece in kept], sizes).astype(np.float32),
+        scores=np.concatenate([np.array(piece.scores, np.float32) for piece in kept]),
+        pictures=tuple(picture for piece in kept for picture in piece.pictures),
     )
 
 
@@ -91,12 +111,13 @@ class Batch:
     """Rows as tensors. Those of tokens have an entry for each token that is learnt, row by row.
 
     Attributes:
-        ids: (rows, longest) padded on the right.
+        inputs: what the model is given: ``input_ids`` (rows, longest), padded on the right, and
+            the pictures (:meth:`agents.finetune.batches.Collator.of_rows`).
         labels: (rows, longest) the token itself, -100 where nothing is learnt.
         advantage, weight, scores: (learnt tokens,).
     """
 
-    ids: torch.Tensor
+    inputs: Mapping[str, torch.Tensor]
     labels: torch.Tensor
     advantage: torch.Tensor
     weight: torch.Tensor
@@ -109,32 +130,30 @@ class Batch:
 
     def on(self, device: Any) -> Batch:
         """The same on a device."""
-        return Batch(**{each.name: getattr(self, each.name).to(device) for each in fields(self)})
+        return Batch(
+            {name: each.to(device) for name, each in self.inputs.items()},
+            *(each.to(device) for each in (self.labels, self.advantage, self.weight, self.scores)),
+        )
 
 
-def batch_of(rows: Sequence[Row], padding: int, multiple: int = 1) -> Batch:
+def batch_of(rows: Sequence[Row], collator: Collator) -> Batch:
     """Rows as tensors; without rows, one of padding.
 
     Args:
         rows: at least the first token of each is not learnt.
-        padding: the token that fills rows up.
-        multiple: the length is one of its multiples
-            (:class:`agents.finetune.batches.Collator`).
+        collator: pads them and opens their pictures, as in fine-tuning.
     """
-    longest = max((len(row.ids) for row in rows), default=1)
-    longest += -longest % multiple
-    ids = torch.full((max(len(rows), 1), longest), padding)
-    labels = torch.full_like(ids, -100)
-    for place, row in enumerate(rows):
-        tokens = torch.from_numpy(row.ids)
-        ids[place, : len(tokens)] = tokens
-        labels[place, : len(tokens)] = tokens.masked_fill(~torch.from_numpy(row.learnt), -100)
+    inputs = collator.of_rows(
+        [(row.ids, np.where(row.learnt, row.ids, -100)) for row in rows],
+        [open_picture(picture.data) for row in rows for picture in row.pictures],
+    )
+    labels = inputs.pop("labels")
 
     def of_tokens(name: str) -> torch.Tensor:
         parts = [np.zeros(0, np.float32), *(getattr(row, name)[row.learnt] for row in rows)]
         return torch.from_numpy(np.concatenate(parts))
 
-    return Batch(ids, labels, of_tokens("advantage"), of_tokens("weight"), of_tokens("scores"))
+    return Batch(inputs, labels, of_tokens("advantage"), of_tokens("weight"), of_tokens("scores"))
 
 
 def batches(lengths: Sequence[int], size: int) -> Iterator[list[int]]:

@@ -13,6 +13,7 @@ from pydantic import Field, field_validator
 
 from agents.configs import ConfigKind, StrictSettings
 from agents.finetune.settings import Fraction, ModelSettings, Positive, Rate
+from er_gym.tasks.types import canonical_names
 
 Weight = Annotated[float, Field(ge=-1_000, le=1_000)]
 
@@ -43,14 +44,22 @@ class CurriculumSettings(StrictSettings):
     """Which tasks are played.
 
     Attributes:
+        types: by any of their names, such as ``single_search``; all of the suite if empty. They are
+            also those of validation.
         floor: the least weight of a type of task. A type with the success s (a fraction) weighs
             s · (1 - s) and this: little where nothing or everything succeeds, since there is
             nothing to compare. With a high floor all types are played alike.
         memory: how much of a type's success of before stays with each update.
     """
 
+    types: tuple[str, ...] = ()
     floor: float = Field(0.05, gt=0, le=1_000)
     memory: Fraction = 0.8
+
+    @field_validator("types")
+    @classmethod
+    def _known(cls, types: tuple[str, ...]) -> tuple[str, ...]:
+        return canonical_names(types)
 
 
 class AdvantageSettings(StrictSettings):

@@ -19,20 +19,21 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
 import accelerate
 import torch
-from accelerate.utils import gather_object
+from accelerate.utils import DistributedDataParallelKwargs, gather_object
 from torch.utils.tensorboard import SummaryWriter
 from transformers.trainer_utils import set_seed
 
 import er_gym
 from agents import configs
 from agents.finetune import machine
+from agents.finetune.batches import Collator
 from agents.finetune.feedback import FEEDBACK
 from agents.finetune.libraries import flush_denormals, quiet_libraries
 from agents.finetune.model_files import (
@@ -167,6 +168,8 @@ def reinforce(
             "play.group is 1; set play.group=8"
         )
     _check_suite(suite, settings)
+    suite = replace(suite, tasks=_of_types(suite, settings))
+    _validation_tasks(settings)
     manifest = ReinforceManifest(
         settings=settings_as_json(settings),
         model=str(files.path),
@@ -207,7 +210,15 @@ def _reinforce(
     dtype = chosen_dtype(settings.model)
     # Another run in this process may have left its own, as transformers' trainer knows, too.
     accelerate.state.AcceleratorState._reset_state()
-    accelerator = accelerate.Accelerator(cpu=not machine.on_gpu(), mixed_precision="no")
+    sees = agent.sees == "pictures"
+    accelerator = accelerate.Accelerator(
+        cpu=not machine.on_gpu(),
+        mixed_precision="no",
+        # A batch without pictures leaves eyes that learn without gradients.
+        kwargs_handlers=[
+            DistributedDataParallelKwargs(find_unused_parameters=_eyes_learn(files, settings))
+        ],
+    )
     lora = settings.model.lora is not None
     network = load_network(files, settings.model, dtype if lora else "float32")
     network.to(accelerator.device)
@@ -227,8 +238,13 @@ def _reinforce(
         start,
         settings,
         accelerator,
-        padding=padding if padding is not None else (files.tokenizer.eos_token_id or 0),
-        multiple=1 if machine.on_gpu() else _CPU_LENGTHS,
+        Collator(
+            files.image_processor if sees else None,
+            files.config.image_token_id if sees else None,
+            agent.pictures.model_bounds,
+            padding if padding is not None else (files.tokenizer.eos_token_id or 0),
+            multiple=1 if machine.on_gpu() else _CPU_LENGTHS,
+        ),
         rounded=dtype == "bfloat16",
     )
 
@@ -251,14 +267,15 @@ def _reinforce(
         stack.callback(board.close)
 
     # -- who plays: the ordinary agent with the copy, in environments that stay open --
-    env = {**suite.env, **settings.play.env, "obs_mode": f"{agent.obs_mode}+{ANCHOR}"}
+    observed = {"obs_mode": f"{agent.obs_mode}+{ANCHOR}"}
+    env = {**suite.env, **agent.env, **settings.play.env, **observed}
     pool = stack.enter_context(EnvPool(settings.play.workers, settings.play.concurrency, env))
     samplers = {}
     for name, how in {"play": agent, "validate": _greedy(agent)}.items():
         chatting = checkpoint_in_memory(
             PlayingCopy(playing.network, rounded=False).network,
             files.tokenizer,
-            None,
+            files.image_processor if sees else None,
             files.template,
             how,
         )
@@ -395,10 +412,10 @@ def _agent_settings(files: ModelFiles, settings: ReinforceSettings) -> AgentSett
     if play.max_tokens is not None:
         overrides.append(f"sampling.max_tokens={play.max_tokens}")
     agent = configs.load(AgentSettings, files.path / AGENT, "agent", overrides)
-    if agent.sees == "pictures":
+    if agent.sees == "pictures" and not files.has_vision:
         raise ValueError(
-            f"{files.path} is shown pictures, and er-gym reinforce trains models that read text "
-            "(sees: text)"
+            f"{files.path} has no vision, and its {AGENT} shows it pictures; set sees: text there, "
+            "or give a model that sees"
         )
     penalty = _repetition_penalty(files)
     if penalty not in (None, 1.0):
@@ -419,6 +436,10 @@ def _repetition_penalty(files: ModelFiles) -> float | None:
     return found.repetition_penalty
 
 
+def _eyes_learn(files: ModelFiles, settings: ReinforceSettings) -> bool:
+    return files.has_vision and not {"vision", "projector"} <= {*settings.model.freeze}
+
+
 def _greedy(agent: AgentSettings) -> AgentSettings:
     sampling = agent.sampling.model_copy(update={"temperature": 0.0})
     return agent.model_copy(update={"sampling": sampling})
@@ -433,10 +454,22 @@ def _check_suite(suite: Suite, settings: ReinforceSettings) -> None:
         raise ValueError(f"the suite {suite.name} {why}; learn from --suite train")
 
 
+def _of_types(suite: Suite, settings: ReinforceSettings) -> tuple[Task, ...]:
+    """The tasks of the types that are played."""
+    types = settings.curriculum.types
+    found = tuple(task for task in suite.tasks if not types or task.type.name in types)
+    if not found:
+        raise ValueError(
+            f"the suite {suite.name} has no task of curriculum.types {', '.join(types)}; give "
+            "another suite or other types"
+        )
+    return found
+
+
 def _validation_tasks(settings: ReinforceSettings) -> list[Task]:
     if not settings.validation.tasks:
         return []
-    every = list(load_suite(settings.validation.suite).tasks)
+    every = list(_of_types(load_suite(settings.validation.suite), settings))
     random.Random(0).shuffle(every)
     return every[: settings.validation.tasks]
 

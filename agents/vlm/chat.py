@@ -57,6 +57,11 @@ class Message:
     reasoning: str = ""
 
 
+def pictures_of(messages: Sequence[Message]) -> list[Picture]:
+    """The pictures of messages, in order."""
+    return [part for each in messages for part in each.parts if isinstance(part, Picture)]
+
+
 @dataclass(frozen=True)
 class Usage:
     """Token counts of a request and its reply, as the server reports them.

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from agents.vlm.chat import CUT_SHORT, LEFT_OUT, Message, Part, Picture
+from agents.vlm.chat import CUT_SHORT, LEFT_OUT, Message, Part, Picture, pictures_of
 from er_gym.rollout.causes import PICTURES
 
 _PART = 4
@@ -67,7 +67,7 @@ class Limits:
 
 def pictures_in(messages: Sequence[Message]) -> int:
     """How many pictures messages have."""
-    return sum(isinstance(part, Picture) for message in messages for part in message.parts)
+    return len(pictures_of(messages))
 
 
 def _shortenable(messages: Sequence[Message]) -> range:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil, floor, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from agents.vlm.chat import Picture
 from agents.vlm.settings import Pictures
@@ -67,6 +69,28 @@ def encode(rgb: NDArray[np.uint8], settings: Pictures) -> Picture:
     size = fitted(width, height, settings)
     data = encode_picture(rgb, size, form=settings.format, quality=settings.quality)
     return Picture(data, f"image/{settings.format}", *size)
+
+
+def patches_of(
+    image_processor: Any, images: Sequence[Image.Image], bounds: tuple[int, int]
+) -> tuple[Any, Any]:
+    """Pictures as models of Qwen's take them, at play and at learning alike.
+
+    Args:
+        image_processor: the model's.
+        images: at least one, RGB.
+        bounds: the least and the most pixels of a picture; one with fewer or more is scaled.
+
+    Returns:
+        (patches, values of a patch), and (pictures, 3): patches in time, height and width.
+
+    Raises:
+        ValueError: the model cannot take a picture of such a shape.
+    """
+    least, most = bounds
+    size = {"shortest_edge": least, "longest_edge": most}
+    seen = image_processor(images, size=size, return_tensors="pt")
+    return seen["pixel_values"], seen["image_grid_thw"]
 
 
 def noise_like(picture: Picture, settings: Pictures, seed: Sequence[int]) -> Picture:

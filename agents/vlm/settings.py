@@ -270,3 +270,10 @@ class AgentSettings(StrictSettings):
         if self.sees == "pictures":
             return "rgb"
         return "objects" if self.prompts.dialect else "text"
+
+    @property
+    def env(self) -> dict[str, Any]:
+        """The arguments of the environment that the agent needs: observations and their size."""
+        size = {"width": self.pictures.width, "height": self.pictures.height}
+        wanted = {name: pixels for name, pixels in size.items() if pixels is not None}
+        return {**wanted, "obs_mode": self.obs_mode}

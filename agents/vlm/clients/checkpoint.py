@@ -121,12 +121,15 @@ def checkpoint_in_memory(
 def _prepare(model: Any, tokenizer: Any, settings: AgentSettings) -> frozenset[int]:
     """Let a model generate by the settings; gives the tokens that end a reply."""
     ends, pad = _end_tokens(model, tokenizer), tokenizer.pad_token_id
+    picture = model.config.image_token_id if settings.sees == "pictures" else None
     model.generation_config = transformers.GenerationConfig(
         do_sample=False,
         max_new_tokens=settings.sampling.max_tokens,
         eos_token_id=sorted(ends),
         pad_token_id=min(ends, default=None) if pad is None else pad,
         repetition_penalty=model.generation_config.repetition_penalty,
+        # Where a picture goes; the model cannot be given it where none is.
+        suppress_tokens=None if picture is None else [picture],
     )
     return ends
 

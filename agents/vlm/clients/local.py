@@ -27,6 +27,7 @@ from agents.vlm.chat import (
     Picture,
     Reply,
     Usage,
+    pictures_of,
     template_message,
 )
 from agents.vlm.clients.batching import CLOSED, SteppedJobs, batches
@@ -42,6 +43,7 @@ from agents.vlm.clients.packed_rows import PackedModel, PackedRow, can_be_packed
 from agents.vlm.clients.padded_batch import EncodedPrompt, PaddedBatch
 from agents.vlm.clients.seeded_sampling import SeededSampling
 from agents.vlm.clients.supervisor import AGAIN, RequestSupervisor
+from agents.vlm.pictures import patches_of
 from agents.vlm.settings import AgentSettings
 from er_gym.data.pictures import open_picture
 from er_gym.rollout.agent import CannotGoOn
@@ -61,12 +63,14 @@ class Spoken:
         said: the tokens of the reply, the one that ends it included.
         scores: (said,) the logarithm of the probability with which each was drawn; empty where that
             is not known.
+        pictures: those of the prompt, in order.
     """
 
     reply: Reply
     prompt: Sequence[int]
     said: Sequence[int]
     scores: Sequence[float] = ()
+    pictures: Sequence[Picture] = ()
 
 
 class LocalClient:
@@ -169,7 +173,8 @@ class LocalClient:
             raise CannotGoOn(CLOSED.message)
         start = time.monotonic()
         spoken = self._jobs.do(self._row(messages, seed))
-        return replace(spoken, reply=replace(spoken.reply, seconds=time.monotonic() - start))
+        reply = replace(spoken.reply, seconds=time.monotonic() - start)
+        return replace(spoken, reply=reply, pictures=pictures_of(messages))
 
     def forget(self) -> None:
         """Drop what is kept of conversations: memory is short, or the model's weights are others
@@ -188,7 +193,7 @@ class LocalClient:
 
     def _row(self, messages: Sequence[Message], seed: int) -> EncodedPrompt:
         text = self._prompt(messages)
-        pictures = [part for each in messages for part in each.parts if isinstance(part, Picture)]
+        pictures = pictures_of(messages)
         digests = [picture.digest for picture in pictures]
         name = conversation_name(messages, seed)
         kept = self._kept.take(name) if self._kept is not None else None
@@ -260,18 +265,16 @@ class LocalClient:
                 f"{self._name} was loaded without vision, since the agent's setting sees is text, "
                 "but the conversation has a picture"
             )
-        least, most = self._settings.pictures.model_bounds
         try:
-            seen = self._image_processor(
+            return patches_of(
+                self._image_processor,
                 [open_picture(each.data) for each in pictures],
-                size={"shortest_edge": least, "longest_edge": most},
-                return_tensors="pt",
+                self._settings.pictures.model_bounds,
             )
         except (OSError, ValueError) as error:
             raise ConversationRefused(
                 f"a picture cannot be processed: {error_summary(error)}", REQUEST
             ) from None
-        return seen["pixel_values"], seen["image_grid_thw"]
 
     def _with_image_tokens(
         self, ids: Sequence[int], grids: torch.Tensor | None

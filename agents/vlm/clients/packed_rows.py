@@ -26,7 +26,7 @@ from transformers import AttentionInterface
 from agents.vlm.clients.compiled_attention import NextTokens, addresses, has_kernel
 from agents.vlm.clients.kv_cache import CachedTurns, grown, positions_of, whole_model
 from agents.vlm.clients.padded_batch import EncodedPrompt, new_pictures
-from agents.vlm.clients.seeded_sampling import SampledScores, with_noise
+from agents.vlm.clients.seeded_sampling import SampledScores, never_drawn, with_noise
 from agents.vlm.settings import Sampling
 
 _NAME = "er_gym_packed_rows"
@@ -130,6 +130,8 @@ class PackedRow:
 class PackedModel:
     """A model on a CPU that generates the replies to several conversations, step by step.
 
+    It never says the token of a picture: with no picture there, the model cannot be given it.
+
     Args:
         model: the model; its attention is replaced.
         image_token: the token of a picture; None for a model without pictures.
@@ -162,6 +164,8 @@ class PackedModel:
             said = [torch.tensor([row.prompt.ids + row.said]) for row in rows]
             parts = zip(said, scores.split(1), strict=True)
             scores = torch.cat([self._penalty(ids, one) for ids, one in parts])
+        if self._image_token is not None:
+            never_drawn(scores, self._image_token)
         noisy = scores
         sources = [row.source for row in rows if row.source is not None]
         if sources:  # all rows are drawn alike

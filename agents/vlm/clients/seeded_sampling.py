@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import torch
 import transformers
 
+_NEVER = -1e9  # finite, so that the entropy of such scores is a number
+
 
 class SeededSampling:
     """Samples the next token of each row with the row's own seed, independent of the batch.
@@ -42,6 +44,11 @@ class SampledScores:
         if self._likeliest is not None:
             scores = self._likeliest(None, scores)
         return scores
+
+
+def never_drawn(scores: torch.Tensor, token: int) -> None:
+    """Change scores, (rows, words), so that a token is never drawn."""
+    scores[:, token] = _NEVER
 
 
 def with_noise(scores: torch.Tensor, sources: Sequence[torch.Generator]) -> torch.Tensor:

@@ -113,7 +113,7 @@ def test_what_is_learnt_is_what_is_read_at_play(
     client = LocalClient(str(path), settings)
     files = open_model(path)
     image_token = files.config.image_token_id
-    collate = Collator(files.image_processor, image_token, DataSettings(**BOUNDS), 0)
+    collate = Collator(files.image_processor, image_token, DataSettings(**BOUNDS).bounds, 0)
     for chat in (each for each in chats if FEEDBACK not in " ".join(t.text for t in each.turns)):
         encoded = made.encode(chat)
         ids, labels = expanded(encoded, image_token)
@@ -153,7 +153,7 @@ def test_the_length_is_known_without_reading_pictures(
     made = encoder(models())
     files = open_model(models())
     image_token = files.config.image_token_id
-    collate = Collator(files.image_processor, image_token, DataSettings(**BOUNDS), 0)
+    collate = Collator(files.image_processor, image_token, DataSettings(**BOUNDS).bounds, 0)
     encoded = [made.encode(chat) for chat in chats]
     assert [collate([each])["tokens"] for each in encoded] == [each.length for each in encoded]
     grids = collate(encoded)["image_grid_thw"].prod(dim=1) // 4
@@ -216,7 +216,7 @@ def test_a_picture_of_another_size_than_its_record_is_refused(
     models: Any, played: Collection, chats: tuple[Chat, ...]
 ) -> None:
     files = open_model(models())
-    collate = Collator(files.image_processor, files.config.image_token_id, DataSettings(), 0)
+    collate = Collator(files.image_processor, files.config.image_token_id, DataSettings().bounds, 0)
     encoded = encoder(models()).encode(chats[0])
     wrong = [each.model_copy(update={"width": 99}) for each in encoded.pictures]
     with pytest.raises(ValueError, match="128 × 72 pixels, but its record says 99 × 72"):
@@ -230,7 +230,7 @@ def test_the_tokens_of_a_covered_picture_learn_what_is_in_their_square(
 ) -> None:
     files = open_model(models())
     image = files.config.image_token_id
-    collate = Collator(files.image_processor, image, DataSettings(**BOUNDS), 0)
+    collate = Collator(files.image_processor, image, DataSettings(**BOUNDS).bounds, 0)
     plain = next(each for each in chats if len(each.pictures) > 1)
     cells = "".join(SYMBOLS[k % 3] for k in range(ROWS * COLUMNS))
     names = ("nothing", "Fridge", "Mug")

@@ -1,4 +1,4 @@
-"""A tiny language model with random weights, and how it converses."""
+"""Tiny models with random weights, and how they converse."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -33,12 +34,23 @@ def one_thread() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """It says a letter at a time."""
-    made = make_tiny_qwen(tmp_path_factory.mktemp("reinforce") / "model", family="qwen2")
+    """It reads, and says a letter at a time."""
+    agent = {"sees": "text", "prompts": {"dialect": "text"}}
+    return _model(tmp_path_factory.mktemp("reads"), "qwen2", agent)
+
+
+@pytest.fixture(scope="session")
+def seeing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """It sees small pictures, and says a letter at a time."""
+    agent = {"prompts": {"dialect": "sight"}, "pictures": {"width": 60, "height": 60}}
+    return _model(tmp_path_factory.mktemp("sees"), "qwen2_5_vl", agent)
+
+
+def _model(folder: Path, family: str, agent: dict[str, Any]) -> Path:
+    made = make_tiny_qwen(folder / "model", family=family)
     told = json.loads((made / "generation_config.json").read_text()) | {"repetition_penalty": 1.0}
     (made / "generation_config.json").write_text(json.dumps(told))
-    agent = {"sees": "text", "prompts": {"dialect": "text"}, "sampling": {"max_tokens": 1}}
-    (made / "agent.yaml").write_text(yaml.safe_dump(agent))
+    (made / "agent.yaml").write_text(yaml.safe_dump({**agent, "sampling": {"max_tokens": 1}}))
     return made
 
 

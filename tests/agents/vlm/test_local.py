@@ -240,6 +240,7 @@ def test_replies_end_at_the_models_end_or_at_the_limit(client: Clients, reuse: b
     replies = at_once(model, [(user("Go", str(number)),) for number in range(8)])
     assert sorted(map(len, said)) == sorted(reply.usage.completion for reply in replies)
     assert not any(ends.intersection(each[:-1]) for each in said)
+    assert model._image_token not in {token for each in said for token in each}
     assert {(each[-1] in ends, len(each) < 150) for each in said} == {(True, True), (False, False)}
     assert {(reply.finish, reply.usage.completion < 150) for reply in replies} == {
         ("stop", True),
