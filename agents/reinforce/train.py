@@ -13,7 +13,6 @@ all tokens after the first prompt, learnt or not (TRL 1.16; docs/reinforcement.m
 from __future__ import annotations
 
 import hashlib
-import random
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
@@ -31,7 +30,6 @@ from torch.utils.tensorboard import SummaryWriter
 from transformers.trainer_utils import set_seed
 
 import er_gym
-from agents import configs
 from agents.finetune import machine
 from agents.finetune.batches import Collator
 from agents.finetune.feedback import FEEDBACK
@@ -56,6 +54,14 @@ from agents.finetune.network import (
 from agents.finetune.run_files import LOGS, METRICS, RunFiles, replaced_folder
 from agents.reinforce.advantages import ADVANTAGES, spread, widest
 from agents.reinforce.branches import with_values
+from agents.reinforce.checks import (
+    agent_settings,
+    check_suite,
+    eyes_learn,
+    greedy,
+    tasks_of_types,
+    validation_tasks,
+)
 from agents.reinforce.curriculum import chosen_tasks, with_results
 from agents.reinforce.episodes import Episode, scored
 from agents.reinforce.learner import Learner
@@ -78,12 +84,10 @@ from agents.vlm.clients.local import LocalClient
 from agents.vlm.matching import Matcher
 from agents.vlm.prompts import prompts_for
 from agents.vlm.settings import AgentSettings
-from agents.vlm.tuned_model import AGENT
 from er_gym.activity import begin
 from er_gym.rollout.env_pool import EnvPool
 from er_gym.rollout.run_directory import Manifest
-from er_gym.tasks.splits import rooms_kept_for_evaluation
-from er_gym.tasks.suites import Suite, load_suite
+from er_gym.tasks.suites import Suite
 from er_gym.tasks.task import Task
 
 _CPU_LENGTHS = 32  # lengths of batches are multiples, as in fine-tuning
@@ -158,7 +162,7 @@ def reinforce(
     # -- files alone: what is wrong with them is said before anything is written or loaded --
     begin(f"reading the model {model}")
     files = open_model(model)
-    agent = _agent_settings(files, settings)
+    agent = agent_settings(files, settings)
     row = ADVANTAGES.get(settings.advantage.row)
     for name in settings.rewards:
         REWARDS.get(name)
@@ -167,9 +171,9 @@ def reinforce(
             f"advantage.row={settings.advantage.row} compares the episodes of a task, and "
             "play.group is 1; set play.group=8"
         )
-    _check_suite(suite, settings)
-    suite = replace(suite, tasks=_of_types(suite, settings))
-    _validation_tasks(settings)
+    check_suite(suite, settings)
+    suite = replace(suite, tasks=tasks_of_types(suite, settings))
+    validation_tasks(settings)  # played later, but what is wrong with them is said now
     manifest = ReinforceManifest(
         settings=settings_as_json(settings),
         model=str(files.path),
@@ -216,7 +220,7 @@ def _reinforce(
         mixed_precision="no",
         # A batch without pictures leaves eyes that learn without gradients.
         kwargs_handlers=[
-            DistributedDataParallelKwargs(find_unused_parameters=_eyes_learn(files, settings))
+            DistributedDataParallelKwargs(find_unused_parameters=eyes_learn(files, settings))
         ],
     )
     lora = settings.model.lora is not None
@@ -271,7 +275,7 @@ def _reinforce(
     env = {**suite.env, **agent.env, **settings.play.env, **observed}
     pool = stack.enter_context(EnvPool(settings.play.workers, settings.play.concurrency, env))
     samplers = {}
-    for name, how in {"play": agent, "validate": _greedy(agent)}.items():
+    for name, how in {"play": agent, "validate": greedy(agent)}.items():
         chatting = checkpoint_in_memory(
             PlayingCopy(playing.network, rounded=False).network,
             files.tokenizer,
@@ -289,7 +293,7 @@ def _reinforce(
     # -- the loop --
     process, processes = accelerator.process_index, accelerator.num_processes
     row = ADVANTAGES.get(settings.advantage.row)
-    checked = _validation_tasks(settings)
+    checked = validation_tasks(settings)
     validation = state.best
     if checked and not state.update:
         begin("validation before the first update")
@@ -393,85 +397,7 @@ def _reinforce(
     return _result(run, new=True)
 
 
-# -- settings, and what is checked before ----------------------------------------------------------
-
-
-def _agent_settings(files: ModelFiles, settings: ReinforceSettings) -> AgentSettings:
-    """How the model converses while it learns."""
-    if not files.agent:
-        raise ValueError(
-            f"{files.path} has no {AGENT}, which says how it converses; give a model of er-gym "
-            f"finetune, or write one (docs/agents.md)"
-        )
-    play = settings.play
-    overrides = [
-        f"sampling.temperature={play.temperature}",
-        "sampling.top_p=1.0",
-        f"local.batch={play.concurrency}",
-    ]
-    if play.max_tokens is not None:
-        overrides.append(f"sampling.max_tokens={play.max_tokens}")
-    agent = configs.load(AgentSettings, files.path / AGENT, "agent", overrides)
-    if agent.sees == "pictures" and not files.has_vision:
-        raise ValueError(
-            f"{files.path} has no vision, and its {AGENT} shows it pictures; set sees: text there, "
-            "or give a model that sees"
-        )
-    penalty = _repetition_penalty(files)
-    if penalty not in (None, 1.0):
-        raise ValueError(
-            f"{files.path} is played with repetition_penalty {penalty}, so it would learn from "
-            "other chances than it plays by; set it to 1.0 in its generation_config.json"
-        )
-    return agent
-
-
-def _repetition_penalty(files: ModelFiles) -> float | None:
-    import transformers
-
-    try:
-        found = transformers.GenerationConfig.from_pretrained(files.base, local_files_only=True)
-    except OSError:  # it has none
-        return None
-    return found.repetition_penalty
-
-
-def _eyes_learn(files: ModelFiles, settings: ReinforceSettings) -> bool:
-    return files.has_vision and not {"vision", "projector"} <= {*settings.model.freeze}
-
-
-def _greedy(agent: AgentSettings) -> AgentSettings:
-    sampling = agent.sampling.model_copy(update={"temperature": 0.0})
-    return agent.model_copy(update={"sampling": sampling})
-
-
-def _check_suite(suite: Suite, settings: ReinforceSettings) -> None:
-    kept = rooms_kept_for_evaluation(suite.tasks)
-    if kept or suite.name == settings.validation.suite:
-        why = f"plays in rooms that are kept for evaluation, such as {kept[0]}" if kept else (
-            "is the one that validation chooses by"
-        )  # fmt: skip
-        raise ValueError(f"the suite {suite.name} {why}; learn from --suite train")
-
-
-def _of_types(suite: Suite, settings: ReinforceSettings) -> tuple[Task, ...]:
-    """The tasks of the types that are played."""
-    types = settings.curriculum.types
-    found = tuple(task for task in suite.tasks if not types or task.type.name in types)
-    if not found:
-        raise ValueError(
-            f"the suite {suite.name} has no task of curriculum.types {', '.join(types)}; give "
-            "another suite or other types"
-        )
-    return found
-
-
-def _validation_tasks(settings: ReinforceSettings) -> list[Task]:
-    if not settings.validation.tasks:
-        return []
-    every = list(_of_types(load_suite(settings.validation.suite), settings))
-    random.Random(0).shuffle(every)
-    return every[: settings.validation.tasks]
+# -- what is played ------------------------------------------------------------------------------
 
 
 def _played(suite: Suite, env: dict[str, Any], files: ModelFiles) -> Manifest:

@@ -42,7 +42,8 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def seeing(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """It sees small pictures, and says a letter at a time."""
-    agent = {"prompts": {"dialect": "sight"}, "pictures": {"width": 60, "height": 60}}
+    pictures = {"width": 60, "height": 60, "model_min_pixels": 6_000}
+    agent = {"prompts": {"dialect": "sight"}, "pictures": pictures}
     return _model(tmp_path_factory.mktemp("sees"), "qwen2_5_vl", agent)
 
 

@@ -20,14 +20,17 @@ from agents.finetune.network import load_network
 from agents.finetune.run_files import RunFiles, lines_of
 from agents.finetune.settings import ModelSettings
 from agents.reinforce import train as training
+from agents.reinforce.checks import validation_tasks
 from agents.reinforce.episodes import Turn
 from agents.reinforce.learner import Learner
 from agents.reinforce.rows import Row, rows_of
 from agents.reinforce.run_files import EPISODES
-from agents.reinforce.settings import ReinforceSettings
+from agents.reinforce.settings import ReinforceSettings, load_settings
 from agents.reinforce.train import reinforce
 from agents.vlm.chat import Message, pictures_of
 from agents.vlm.clients.local import LocalClient
+from er_gym.tasks.config_folder import config_directory
+from er_gym.tasks.reading import read_yaml
 from er_gym.tasks.suites import Suite
 
 TIMES = ("seconds", "seconds_playing", "seconds_learning", "memory")
@@ -85,7 +88,7 @@ def test_the_learner_is_shown_what_the_agent_saw(family: str, tmp_path: Path) ->
 def run_settings(**more: Any) -> ReinforceSettings:
     told: dict[str, Any] = {
         "rewards": {"bandit:even_letters": 1.0},
-        "curriculum": {"types": ["search", "manipulate"]},
+        "curriculum": {"types": ["SingleToggle"]},
         "model": {"dtype": "float32", "freeze": ["vision"]},
         "play": {"tasks": 1, "group": 3, "concurrency": 1},
         "advantage": {"row": "gigpo", "discount": 0.0},
@@ -112,10 +115,11 @@ def test_a_model_that_sees_learns_and_goes_on_after_an_interruption(
 
     learn, seen = Learner.learn, iter(range(1, 100))
 
-    def interrupted(*args: Any) -> Any:
+    def interrupted(learner: Learner, rows: Sequence[Row], update: int) -> dict[str, float]:
+        assert {(p.width, p.height) for row in rows for p in row.pictures} == {(60, 60)}
         if next(seen) == 3:
             raise KeyboardInterrupt
-        return learn(*args)
+        return learn(learner, rows, update)
 
     monkeypatch.setattr(training.Learner, "learn", interrupted)
     with pytest.raises(KeyboardInterrupt):
@@ -123,7 +127,9 @@ def test_a_model_that_sees_learns_and_goes_on_after_an_interruption(
     assert len(curve(cut)) == 2
     reinforce(run_settings(), seeing, suite, cut)
     assert curve(cut) == lines
-    assert lines_of(cut / EPISODES) == lines_of(whole / EPISODES)
+    episodes = lines_of(whole / EPISODES)
+    assert lines_of(cut / EPISODES) == episodes
+    assert {each["type"] for each in episodes} == {"single_toggle"}
     mine, theirs = ((each / "model/model.safetensors").read_bytes() for each in (cut, whole))
     assert mine == theirs
 
@@ -169,4 +175,12 @@ def test_what_a_model_cannot_see_is_said(
     with pytest.raises(ValueError, match="single_search"):
         run_settings(curriculum={"types": ["searching"]})
     checked = run_settings(curriculum={"types": ["pickup_and_put"]}, validation={"tasks": 9})
-    assert {each.type.name for each in training._validation_tasks(checked)} == {"pickup_and_put"}
+    assert {each.type.name for each in validation_tasks(checked)} == {"pickup_and_put"}
+
+
+def test_each_configuration_can_be_read() -> None:
+    names = {file.stem for file in config_directory("reinforce").glob("*.yaml")}
+    assert {"tiny", "er-tiny-text", "er-tiny-vl"} <= names
+    made = {name: load_settings(name) for name in names}
+    taught = read_yaml(config_directory("ladder") / "er-tiny-vl.yaml")["types"]
+    assert set(made["er-tiny-vl"].curriculum.types) == set(taught)
