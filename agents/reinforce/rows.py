@@ -26,7 +26,7 @@ class Row:
         advantage: (tokens,) float32.
         weight: (tokens,) float32, how much a token counts among those of an update.
         scores: (tokens,) float32, the logarithm of the probability at play; NaN if unknown.
-        pictures: in order, as files in memory: their patches would take thirty times as much.
+        pictures: in order, as files in memory: their patches would take many times as much.
     """
 
     ids: NDArray[np.int64]
