@@ -57,7 +57,10 @@ class EventMetadata(LazyMetadata, ai2thor.server.MetadataWrapper):  # type: igno
 
 
 class EmbeddedEvent(ai2thor.server.Event):  # type: ignore[misc]  # untyped
-    """An event that keeps lazy metadata lazy and is freed as soon as nobody refers to it."""
+    """An agent's event that keeps lazy metadata lazy and is freed as soon as nobody refers to it.
+
+    If there are several agents, the controller returns the official ``MultiAgentEvent`` of them.
+    """
 
     def __init__(self, metadata: LazyMetadata) -> None:
         # Event copies the metadata that it gets, and a copy computes every value.
@@ -66,7 +69,7 @@ class EmbeddedEvent(ai2thor.server.Event):  # type: ignore[misc]  # untyped
 
     @property
     def events(self) -> list[EmbeddedEvent]:
-        """The events of all agents: there is only one agent."""
+        """The events of all agents, if this is the only one."""
         return [self]
 
     @events.setter
@@ -102,10 +105,19 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
             # The client drops this event in favour of that of the Initialize which it sends next.
             action = {**action, "renderImage": False}
         metadata, frames = self.engine.step(action)
+        event = self._event_of(metadata, frames)
+        others = self.engine.bystanders
+        if others:
+            events = [event, *(self._event_of(*each) for each in others)]
+            events.sort(key=lambda each: each.metadata["agentId"])
+            event = ai2thor.server.MultiAgentEvent(metadata["agentId"], events)
+        self._event = event
+
+    def _event_of(self, metadata: LazyMetadata, frames: View | None) -> EmbeddedEvent:
         event = EmbeddedEvent(metadata)
         if frames is not None:
             self._attach(event, frames)
-        self._event = event
+        return event
 
     def receive(self, timeout: float | None = None) -> ai2thor.server.Event:
         """The event of the action last sent."""

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from weakref import ReferenceType, ref
 
 from er_gym.sim.actions import perform
+from er_gym.sim.crew import as_agent
 from er_gym.sim.errors import ActionFailed, WrongCall
 from er_gym.sim.house.build import EMPTY, house_scene
 from er_gym.sim.lazy_metadata import LazyMetadata
@@ -30,6 +31,13 @@ class Answer(NamedTuple):
     error: str = ""
     code: str | None = None
     reply: Any = None
+
+
+class Bystander(NamedTuple):
+    """What an agent that did not act is told, and what it sees; see :meth:`Engine.step`."""
+
+    metadata: LazyMetadata
+    view: View | None
 
 
 def _answer(act: Callable[[], Any]) -> Answer:
@@ -65,7 +73,10 @@ class Engine:
         if light not in LIGHTS:
             raise ValueError(f"unknown light {light!r}; choose one of: {', '.join(LIGHTS)}")
         self._kind = metadata_kind
-        self._last: ReferenceType[LazyMetadata] | None = None
+        self._last: tuple[ReferenceType[LazyMetadata], ...] = ()
+        # What each agent of several did last, and with which answer.
+        self._did: dict[int, tuple[str, Answer]] = {}
+        self.bystanders: tuple[Bystander, ...] = ()
         settings = Settings(width=width, height=height, light=light)
         self.world = World.load(load_scene(SCENE_NAMES[0]), settings)
 
@@ -73,10 +84,10 @@ class Engine:
         """Do one action, given as the AI2-THOR client sends it.
 
         This raises nothing. The metadata report every failure (``lastActionSuccess``,
-        ``errorMessage``, ``errorCode``).
+        ``errorMessage``, ``errorCode``). :attr:`bystanders` are the agents that did not act.
 
         Returns:
-            The metadata, and the images unless ``renderImage`` is False.
+            The acting agent's metadata, and its images unless ``renderImage`` is False.
         """
         name = str(request.get("action"))
         if name == "Reset":  # it makes a new world, so the last metadata need not be settled
@@ -86,16 +97,34 @@ class Engine:
         settings = self.world.settings
         self.world.settings = with_flags(settings, request)
         report = metadata(self.world, name, *answer, self._kind)
-        self._last = ref(report)
         frames = draw(self.world) if request.get("renderImage", True) else None
+        self._last = (ref(report),)
+        if self.world.others:
+            self.bystanders = self._watching(name, answer, frames)
+            self._last += tuple(ref(each.metadata) for each in self.bystanders)
         self.world.settings = settings
         return report, frames
 
+    def _watching(self, name: str, answer: Answer, frames: View | None) -> tuple[Bystander, ...]:
+        """The agents that did not act; each is told again what it did itself."""
+        if name == "Initialize" and not answer.error:
+            self._did = {}  # all did
+        self._did[self.world.acting] = name, answer
+        found = []
+        for number in self.world.others:
+            own = as_agent(self.world, number)
+            did, told = self._did.setdefault(number, (name, answer))
+            seen = None if frames is None else draw(own, frames.third_party)
+            found.append(Bystander(metadata(own, did, *told, self._kind), seen))
+        return tuple(found)
+
     def do(self, act: Callable[[World], Any]) -> Answer:
         """Do something to the world, without metadata and images; what it raises is answered."""
-        last = None if self._last is None else self._last()
-        if last is not None:
-            last.settle()  # its reader wants the state before this action
+        self.bystanders = ()
+        for each in self._last:
+            last = each()
+            if last is not None:
+                last.settle()  # its reader wants the state before this action
         return _answer(lambda: act(self.world))
 
     def _reset(self, request: Mapping[str, Any]) -> None:
@@ -109,5 +138,6 @@ class Engine:
         now = self.world.settings
         fresh = Settings(width=now.width, height=now.height, light=now.light)
         chance = self.world.chance
+        self.bystanders = ()
         self.world = World.load(scene, fresh)
         self.world.chance = chance

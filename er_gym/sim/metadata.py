@@ -148,7 +148,7 @@ def metadata(
         "lastActionSuccess": not error,
         "screenWidth": settings.width,
         "screenHeight": settings.height,
-        "agentId": 0,
+        "agentId": world.acting,
         "colors": _colors(world),  # now, because a step may ask for segmentation for itself alone
         "updateCount": 0,
         "fixedUpdateCount": 0,

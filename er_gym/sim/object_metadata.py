@@ -150,7 +150,7 @@ def _entries(world: World, rows: list[int]) -> list[Parts]:
             "objectType": world.types[i],
             "objectId": ids[i],
             "assetId": world.asset_ids[i],
-            "isPickedUp": i == world.held,
+            "isPickedUp": world.is_held(i),
             "isMoving": False,
         }
         nested = {

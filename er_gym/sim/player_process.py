@@ -55,8 +55,8 @@ class PlayerProcess:
     def __init__(self, width: int, height: int, transport: Transport) -> None:
         self._engine = Engine(width, height)
         self._transport = transport
-        self._said: dict[str, Any] = {}
-        self._shown: View | None = None
+        self._said: list[dict[str, Any]] = []
+        self._shown: tuple[View, ...] = ()
         self._images: list[tuple[Field, bytes]] = []
         self._may_patch = True
 
@@ -69,23 +69,34 @@ class PlayerProcess:
             request = {**request, "renderImage": False}  # the client drops this event
         metadata, view = self._engine.step(request)
         said, shown = self._said, self._shown
-        self._said, self._shown = dict(metadata), view
-        if view is not shown and view is not None:
-            self._images = list(images(view))
+        events = [(metadata, view), *self._engine.bystanders]
+        events.sort(key=lambda event: event[0]["agentId"])
+        self._said = [dict(each) for each, _ in events]
+        self._shown = tuple(each for _, each in events if each is not None)
+        same_images = len(shown) == len(self._shown)
+        same_images &= all(a is b for a, b in zip(shown, self._shown, strict=False))
+        if self._shown and not same_images:
+            self._images = list(images(self._shown))
+        active = metadata["agentId"]
+        before = said[active] if active < len(said) else {}
         changes = {
             name: value
             for name, value in metadata.items()
-            if name == "actionReturn" or said.get(name) != value
+            if name == "actionReturn" or before.get(name) != value
         }
         self._transport.send(
             Message(
                 sequence_id=request["sequenceId"],
-                metadata=self._said,
+                agents=self._said,
+                active=active,
                 changes=changes,
-                images=[] if view is None else self._images,
-                same_images=view is shown,
+                images=self._images if self._shown else [],
+                same_images=same_images,
                 may_patch=(
-                    self._may_patch and action in _QUESTIONS and metadata["lastActionSuccess"]
+                    self._may_patch
+                    and action in _QUESTIONS
+                    and metadata["lastActionSuccess"]
+                    and len(said) == len(self._said)
                 ),
             )
         )

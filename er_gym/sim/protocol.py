@@ -20,6 +20,7 @@ import msgpack  # type: ignore[import-untyped]  # what the client reads metadata
 import numpy as np
 from numpy.typing import NDArray
 
+from er_gym.sim.crew import MOST_AGENTS
 from er_gym.sim.render.view import View
 
 _HEADER = struct.Struct("!BI")
@@ -93,10 +94,14 @@ def send(pipe: int, fields: Sequence[tuple[Field, bytes]]) -> None:
             rest = rest[os.write(pipe, rest) :]
 
 
-def images(view: View) -> Iterator[tuple[Field, bytes]]:
-    """The images of a view as fields: the agent's first, then those of each third-party camera."""
+def images(views: Sequence[View]) -> Iterator[tuple[Field, bytes]]:
+    """The images of the agents' views as fields: of each kind the agents' first, in the order of
+    their ids, and then those of each third-party camera."""
     for name, (own, third_party) in _FIELDS.items():
-        for kind, shown in ((own, view), *((third_party, other) for other in view.third_party)):
+        for kind, shown in (
+            *((own, view) for view in views),
+            *((third_party, other) for other in views[0].third_party),
+        ):
             picture = getattr(shown, name)
             if picture is not None:
                 colours_of_ids = name in ("classes", "instances")
@@ -139,10 +144,15 @@ class MetadataPacker:
     def __init__(self) -> None:
         # A string with a lone surrogate cannot be encoded and must not end the player.
         self._packer = msgpack.Packer(unicode_errors="replace")
-        self.objects = ObjectCache(self._packer.pack)
+        self.objects = tuple(ObjectCache(self._packer.pack) for _ in range(MOST_AGENTS))
 
-    def __call__(self, metadata: dict[str, Any], sequence_id: int) -> bytes:
-        """The metadata of a message: that of the one agent, and what the client keeps beside it."""
+    def __call__(self, agents: Sequence[dict[str, Any]], active: int, sequence_id: int) -> bytes:
+        """The metadata of a message: those of all agents, and what the client keeps beside them.
+
+        Args:
+            agents: by their ids.
+            active: the id of the agent that acted.
+        """
         pack = self._packer.pack
         return b"".join(
             (
@@ -150,28 +160,36 @@ class MetadataPacker:
                 pack("sequenceId"),
                 pack(sequence_id),
                 pack("activeAgentId"),
-                pack(0),
+                pack(active),
                 pack("thirdPartyCameras"),
-                pack(metadata["thirdPartyCameras"]),
+                pack(agents[0]["thirdPartyCameras"]),
                 pack("agents"),
-                self._packer.pack_array_header(1),
-                self._packer.pack_map_header(len(metadata)),
-                *self._agent(metadata),
+                self._packer.pack_array_header(len(agents)),
+                *(
+                    part
+                    for pair in zip(agents, self.objects, strict=False)
+                    for part in self._agent(*pair)
+                ),
             )
         )
 
-    def patch(self, changes: dict[str, Any]) -> bytes:
-        """The changes since the last message, whose images the client keeps as well."""
-        packed: bytes = self._packer.pack({"agentId": 0, **changes})
+    def patch(self, active: int, changes: dict[str, Any]) -> bytes:
+        """The changes since the last message, whose images the client keeps as well.
+
+        Args:
+            active: the id of the agent that acted; nothing has changed for the others.
+        """
+        packed: bytes = self._packer.pack({"agentId": active, **changes})
         return packed
 
-    def _agent(self, metadata: dict[str, Any]) -> Iterator[bytes]:
+    def _agent(self, metadata: dict[str, Any], objects: ObjectCache) -> Iterator[bytes]:
         pack = self._packer.pack
+        yield self._packer.pack_map_header(len(metadata))
         for name, value in metadata.items():
             yield pack(name)
             if name == "objects":
                 yield self._packer.pack_array_header(len(value))
-                yield from map(self.objects, value)
+                yield from map(objects, value)
             else:
                 yield pack(value)
 
@@ -180,23 +198,26 @@ class MetadataJson:
     """Encodes metadata as JSON, which WSGI sends."""
 
     def __init__(self) -> None:
-        self.objects = ObjectCache(_json)
+        self.objects = tuple(ObjectCache(_json) for _ in range(MOST_AGENTS))
 
-    def __call__(self, metadata: dict[str, Any], sequence_id: int) -> bytes:
+    def __call__(self, agents: Sequence[dict[str, Any]], active: int, sequence_id: int) -> bytes:
         """The same metadata as :class:`MetadataPacker` encodes."""
-        cameras = _json(metadata["thirdPartyCameras"])
-        agent = b",".join(
-            b"%b:%b" % (_json(name), self._objects(value) if name == "objects" else _json(value))
+        return b'{"sequenceId":%d,"activeAgentId":%d,"thirdPartyCameras":%b,"agents":[%b]}' % (
+            sequence_id,
+            active,
+            _json(agents[0]["thirdPartyCameras"]),
+            b",".join(map(self._agent, agents, self.objects)),
+        )
+
+    def _agent(self, metadata: dict[str, Any], objects: ObjectCache) -> bytes:
+        return b"{%b}" % b",".join(
+            b"%b:%b"
+            % (
+                _json(name),
+                b"[%b]" % b",".join(map(objects, value)) if name == "objects" else _json(value),
+            )
             for name, value in metadata.items()
         )
-        return b'{"sequenceId":%d,"activeAgentId":0,"thirdPartyCameras":%b,"agents":[{%b}]}' % (
-            sequence_id,
-            cameras,
-            agent,
-        )
-
-    def _objects(self, entries: Sequence[dict[str, Any]]) -> bytes:
-        return b"[%b]" % b",".join(map(self.objects, entries))
 
 
 def _json(value: Any) -> bytes:

@@ -45,7 +45,8 @@ class SceneObjects:
         parents: for each object the receptacles that it is in, innermost first as recorded.
         controlled: for each object the rows that it switches, None for what cannot be toggled.
         salient_materials: for each object its materials, None where none is recorded.
-        held: row of the object in the agent's hand, -1 if the hand is empty.
+        held: row of the object in the acting agent's hand, -1 if the hand is empty.
+        held_elsewhere: rows of the objects in other agents' hands.
         remains: rows of wholes that were sliced or broken. The metadata still list them.
         disabled: rows that ``EnableObject`` can bring back, with the rows of their contents.
         listed: the only rows that the metadata list, None for all.
@@ -76,6 +77,7 @@ class SceneObjects:
     controlled: list[tuple[int, ...] | None]
     salient_materials: list[tuple[str, ...] | None]
     held: int = -1
+    held_elsewhere: tuple[int, ...] = ()
     remains: set[int] = field(default_factory=set)
     disabled: dict[int, tuple[int, ...]] = field(default_factory=dict)
     listed: frozenset[int] | None = None
@@ -184,8 +186,19 @@ class SceneObjects:
 
     @property
     def in_hand(self) -> list[int]:
-        """The held object and all objects in it; empty when the hand is."""
+        """What the acting agent holds and all objects in it; empty when the hand is."""
         return [] if self.held < 0 else [self.held, *self.inside(self.held)]
+
+    @property
+    def carried(self) -> list[int]:
+        """What any agent holds and all objects in it."""
+        if not self.held_elsewhere:
+            return self.in_hand
+        return [*self.in_hand, *(k for i in self.held_elsewhere for k in (i, *self.inside(i)))]
+
+    def is_held(self, i: int) -> bool:
+        """Whether object i itself is in the hand of any agent."""
+        return i == self.held or i in self.held_elsewhere
 
     def displaced(self) -> list[int]:
         """Rows of the objects that have been moved, or put into another receptacle, since the scene

@@ -15,6 +15,7 @@ class Settings:
     """What ``Initialize`` sets; lengths in metres, angles in degrees.
 
     The size of pictures and the light come from the engine, and no action changes the light.
+    ``agents`` is how many a house gets. Those that are not ``agents_visible`` hide nothing.
     """
 
     grid_size: float = 0.25
@@ -28,6 +29,8 @@ class Settings:
     render_instances: bool = False
     render_classes: bool = False
     light: str = SOFT
+    agents: int = 1
+    agents_visible: bool = True
 
     @property
     def draws_colors(self) -> bool:

@@ -29,15 +29,17 @@ class Message:
 
     Attributes:
         sequence_id: the number of the request; the client compares it.
-        metadata: all metadata of the event.
-        changes: the part that differs from the last message.
+        agents: all metadata of every agent's event, by their ids.
+        active: the id of the agent that acted.
+        changes: the part of its metadata that differs from the last message.
         images: the images, as :func:`er_gym.sim.protocol.images` gives them.
         same_images: whether the images equal those of the last message.
         may_patch: whether the client accepts a message with the changes only.
     """
 
     sequence_id: int
-    metadata: dict[str, Any]
+    agents: Sequence[dict[str, Any]]
+    active: int
     changes: dict[str, Any]
     images: Sequence[tuple[Field, bytes]]
     same_images: bool
@@ -75,11 +77,12 @@ class Fifo:
 
     def send(self, message: Message) -> None:
         if "sceneName" in message.changes:
-            self._pack.objects.forget()
+            for each in self._pack.objects:
+                each.forget()
         if message.may_patch and message.same_images and not message.changes.keys() & _ONLY_WHOLE:
-            fields = [(Field.PATCH, self._pack.patch(message.changes))]
+            fields = [(Field.PATCH, self._pack.patch(message.active, message.changes))]
         else:
-            metadata = self._pack(message.metadata, message.sequence_id)
+            metadata = self._pack(message.agents, message.active, message.sequence_id)
             fields = [(Field.METADATA, metadata), *message.images]
         send(self._to_client, fields)
 
@@ -106,8 +109,9 @@ class Wsgi:
 
     def send(self, message: Message) -> None:
         if "sceneName" in message.changes:
-            self._encode.objects.forget()
-        metadata = self._encode(message.metadata, message.sequence_id)  # WSGI knows no patches
+            for each in self._encode.objects:
+                each.forget()
+        metadata = self._encode(message.agents, message.active, message.sequence_id)  # no patches
         parts: list[bytes] = []
         for name, text in (("metadata", metadata), ("token", self._token.encode())):
             parts += [self._head(name, "text/plain; charset=utf-8"), text]

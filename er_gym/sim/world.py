@@ -1,4 +1,4 @@
-"""The mutable state of a scene: its objects, the agent and the settings.
+"""The mutable state of a scene: its objects, the agents and the settings.
 
 Every method that changes something calls :meth:`World.arrangement_changed` or
 :meth:`World.state_changed`. They empty the caches, so that readers compute their values again.
@@ -6,9 +6,9 @@ Every method that changes something calls :meth:`World.arrangement_changed` or
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from er_gym.sim.scene import Scene
 from er_gym.sim.scene_objects import PROPERTY_COLUMN, STATE_COLUMN, SceneObjects
 from er_gym.sim.settings import Settings, ThirdPartyCamera
 from er_gym.sim.start_pose import start_pose
+from er_gym.sim.waiting import Waiting
 from er_gym.sim.world_cache import WorldCache
 
 _STEP = 2.0**-40
@@ -46,7 +47,7 @@ def reversible_offset(offset: NDArray[np.float64]) -> NDArray[np.float64]:
 _KEPT_APART = frozenset(
     {
         *("scene", "settings", "agent", "cameras", "map_view", "cache", "base", "listed"),
-        *("look", "chance", "unshown", "lines"),
+        *("look", "chance", "unshown", "lines", "acting", "others", "held_elsewhere"),
     }
 )
 """Fields that a snapshot of the objects does not copy."""
@@ -54,11 +55,13 @@ _KEPT_APART = frozenset(
 
 @dataclass(kw_only=True)
 class World(SceneObjects):
-    """A scene's objects, the agent in it and the settings; made by :meth:`World.load`.
+    """A scene's objects, the agents in it and the settings; made by :meth:`World.load`.
 
     Attributes:
         settings: what ``Initialize`` set.
-        agent: the agent's pose.
+        agent: the pose of the agent that acts.
+        acting: the id of the agent that acts.
+        others: what belongs to the agents that do not, by their ids: :mod:`er_gym.sim.crew`.
         cameras: the third-party cameras.
         map_view: whether the agent's picture shows the room from above (``ToggleMapView``).
         hand: the hand while it is not at rest, None while it is.
@@ -72,6 +75,8 @@ class World(SceneObjects):
 
     settings: Settings
     agent: Agent
+    acting: int = 0
+    others: Mapping[int, Waiting] = field(default_factory=dict)
     base: World | None = None
     cameras: tuple[ThirdPartyCamera, ...] = ()
     map_view: bool = False
@@ -127,6 +132,7 @@ class World(SceneObjects):
         """A copy of the objects as they are now, which :meth:`restore` takes. It becomes
         :attr:`base`."""
         self.base = replace(self, **_objects(self))
+        self.base.wait({})  # it is compared with others, and nobody acts in it
         return self.base
 
     def restore(self, kept: World) -> None:
@@ -285,8 +291,7 @@ class World(SceneObjects):
 
     def remove(self, i: int) -> None:
         """Take object i out of the scene; its contents stay where they are."""
-        if i == self.held:
-            self.let_go()
+        self.release(i)
         for child in self.contents[i]:
             self.parents[child] = tuple(p for p in self.parents[child] if p != i)
             self._displace([child])
@@ -356,6 +361,23 @@ class World(SceneObjects):
     def let_go(self) -> None:
         """Empty the hand, which then is at rest."""
         self.held, self.hand = -1, None
+
+    def release(self, i: int) -> None:
+        """Empty the hand that holds object i, if any does."""
+        if i == self.held:
+            self.let_go()
+        elif i in self.held_elsewhere:
+            self.wait(
+                {
+                    number: replace(other, held=-1, hand=None) if other.held == i else other
+                    for number, other in self.others.items()
+                }
+            )
+
+    def wait(self, others: Mapping[int, Waiting]) -> None:
+        """Let these be the agents that do not act."""
+        self.others = others
+        self.held_elsewhere = tuple(each.held for each in others.values() if each.held >= 0)
 
     def add_object(self, like: int, object_id: str, object_type: str, name: str) -> int:
         """Append a copy of an object under another id and type; returns its row."""

@@ -1,4 +1,5 @@
-"""The state of a world as plain data: how its objects differ from the arranged room, and the agent.
+"""The state of a world as plain data: how its objects differ from the arranged room, and the
+agents.
 
 An episode changes few objects of a room. So the state lists these alone, with the exact bits of
 their numbers, and takes some hundred bytes.
@@ -17,6 +18,7 @@ from er_gym.sim.agent import Agent
 from er_gym.sim.carrying import Hand, Kept
 from er_gym.sim.look import OWN, Chance, Line, Look
 from er_gym.sim.space.line_of_sight_builder import recorded_world
+from er_gym.sim.waiting import Waiting
 from er_gym.sim.world import World
 
 _ARRAYS = (
@@ -43,8 +45,13 @@ def state_of(world: World) -> dict[str, Any]:
         **{name: _changed_rows(getattr(world, name), getattr(base, name)) for name in _ARRAYS},
         **{name: _changed_entries(getattr(world, name), getattr(base, name)) for name in _LISTS},
     }
-    agent = world.agent
+    # One agent alone has no number, and nobody waits for it.
+    several: dict[str, Any] = {}
+    if world.others:
+        others = [[number, _plain_waiting(each)] for number, each in world.others.items()]
+        several = {"acting": world.acting, "others": others}
     return {
+        **several,
         "objects": len(world),
         "changed": {name: rows for name, rows in changed.items() if rows is not None},
         "sets": {name: sorted(getattr(world, name)) for name in _SETS},
@@ -57,7 +64,7 @@ def state_of(world: World) -> dict[str, Any]:
         "unshown": sorted(world.unshown),
         "lines": [list(astuple(line)) for line in world.lines],
         "untouched": world.untouched,
-        "agent": [*agent.position.tolist(), agent.rotation, agent.horizon, agent.standing],
+        "agent": _plain_agent(world.agent),
     }
 
 
@@ -95,10 +102,29 @@ def restore_state(world: World, state: Mapping[str, Any]) -> None:
     world.lines = tuple(
         Line(name, tuple(map(_triple, points)), *others) for name, points, *others in state["lines"]
     )
-    x, y, z, rotation, horizon, standing = state["agent"]
-    # The hand is where its object says, so nothing is carried.
-    world.agent = Agent(np.array([x, y, z]), rotation, horizon, standing)
+    # The hands are where their objects say, so nothing is carried.
+    world.agent, world.acting = _agent_of(state["agent"]), state.get("acting", 0)
+    world.wait({number: _waiting_of(*each) for number, each in state.get("others", ())})
     world.cache.state_changed()
+
+
+def _plain_agent(agent: Agent) -> list[Any]:
+    return [*agent.position.tolist(), agent.rotation, agent.horizon, agent.standing]
+
+
+def _agent_of(plain: Sequence[Any]) -> Agent:
+    x, y, z, rotation, horizon, standing = plain
+    return Agent(np.array([x, y, z]), rotation, horizon, standing)
+
+
+def _plain_waiting(other: Waiting) -> list[Any]:
+    return [_plain_agent(other.agent), other.held, _plain_hand(other.hand), other.map_view]
+
+
+def _waiting_of(
+    agent: Sequence[Any], held: int, hand: Sequence[Any] | None, map_view: bool
+) -> Waiting:
+    return Waiting(_agent_of(agent), held, _hand_of(hand), map_view)
 
 
 def _plain_hand(hand: Hand | None) -> list[Any] | None:

@@ -65,7 +65,7 @@ def test_what_means_nothing_ends_a_program_in_words(program):
         ({"gridSize": -0.25}, "grid size must be in the range"),
         ({"gridSize": 0.25, "fieldOfView": 180}, "noninclusive"),
         ({"fieldOfView": 90, "rotateStepDegrees": 0}, "rotateStepDegrees"),
-        ({"rotateStepDegrees": 90, "agentCount": 2}, "one agent"),
+        ({"rotateStepDegrees": 90, "agentCount": 5}, "up to 4 agents"),
     ):
         with pytest.raises(RuntimeError, match=words):
             controller.reset("FloorPlan1", **wrong)

@@ -203,6 +203,9 @@ NAN, INFINITE = float("nan"), float("inf")
 
 
 WRONG_CALLS = [
+    ("MoveAhead", {"agentId": 1}, "agentId is 1, and the only agent is 0"),
+    ("Pass", {"agentId": "all"}, "agentId is all"),
+    ("Pass", {"agentId": -1}, "agentId is -1"),
     ("PickupObject", {}, "objectId"),
     ("PutObject", {}, "objectId"),
     ("GetInteractablePoses", {}, "objectId"),
@@ -248,7 +251,7 @@ REFUSED = [
     ("Initialize", {"rotateStepDegrees": 0}, "rotateStepDegrees"),
     ("Initialize", {"timeScale": 0}, "Time scale"),
     ("Initialize", {"agentMode": "arm"}, "agentMode"),
-    ("Initialize", {"agentCount": 2}, "agent"),
+    ("Initialize", {"agentCount": 5}, "agents"),
     ("ChangeResolution", {"x": 0, "y": 300}, "x"),
     ("Reset", {"sceneName": "FloorPlan31"}, "FloorPlan31"),
     ("Reset", {"sceneName": [1]}, "sceneName"),

@@ -140,9 +140,8 @@ def _set_pose(world: World, i: int, pose: ObjectPose) -> bool:
     """Put object i at a pose; returns whether it has moved."""
     position = np.array([pose.position.x, pose.position.y, pose.position.z])
     rotation = np.array([pose.rotation.x, pose.rotation.y, pose.rotation.z])
-    was_held = world.held == i
-    if was_held:
-        world.let_go()
+    was_held = world.is_held(i)
+    world.release(i)
     turned = np.abs((rotation - world.rotation[i] + 180.0) % 360.0 - 180.0)
     if not was_held and _is_close(position, world.position[i]) and (turned < _SAME).all():
         return False
@@ -212,7 +211,7 @@ def initial_random_spawn(
         choices = random.permutation(taking).tolist()[:numPlacementAttempts]
         if any(_spawn(world, i, r, random) for r in choices):
             moved.append(i)
-        elif i == world.held:
+        elif world.is_held(i):
             fall(world, i, (world.low[i] + world.high[i]) / 2)
             moved.append(i)
     _name_after_places(world, moved)

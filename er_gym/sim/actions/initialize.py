@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from er_gym.sim.actions.agents import set_agents
 from er_gym.sim.actions.checks import field_of_view, within
 from er_gym.sim.actions.move import snap_to_grid
 from er_gym.sim.actions.registry import action, quoted
+from er_gym.sim.crew import MOST_AGENTS, act_as
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.size import LARGEST_SIDE, check_size
 from er_gym.sim.space.frustum import NEAR_PLANE
@@ -44,21 +46,25 @@ def initialize(
     renderObjectImage: bool | None = None,
     agentMode: str = "default",
     agentCount: int = 1,
+    makeAgentsVisible: bool = True,
 ) -> dict[str, Any]:
     """Set the engine's settings; distances in metres, angles in degrees.
 
     Refusals have AI2-THOR's wording. 0 stands for a default, and a ``visibilityDistance`` that is
-    not positive is ignored. The embedded engine has no arm, no drone and only one agent, and
-    refuses requests for these. All other arguments of AI2-THOR's ``Initialize`` are accepted
-    without effect (docs/fidelity.md lists them), and so are unknown ones.
+    not positive is ignored. The embedded engine has no arm and no drone, and refuses requests for
+    these. Further agents start near the first one. All other arguments of AI2-THOR's
+    ``Initialize`` are accepted without effect (docs/fidelity.md lists them), and so are unknown
+    ones.
     """
     if agentMode.lower() not in ("default", ""):
         raise ActionFailed(
             f"The embedded engine has agentMode 'default' only, not {quoted(agentMode)}; "
             "use backend='unity' for others."
         )
-    if agentCount > 1:
-        raise ActionFailed(f"The embedded engine has one agent, not {agentCount}.")
+    if agentCount > MOST_AGENTS:
+        raise ActionFailed(
+            f"The embedded engine has up to {MOST_AGENTS} agents, not {quoted(agentCount)}."
+        )
     if fieldOfView:
         field_of_view("fov", fieldOfView)
     if timeScale <= 0.0:
@@ -80,10 +86,21 @@ def initialize(
         "render_depth": renderDepthImage,
         "render_instances": _either(renderInstanceSegmentation, renderObjectImage),
         "render_classes": _either(renderSemanticSegmentation, renderClassImage),
+        "agents": max(agentCount, 1),
+        "agents_visible": makeAgentsVisible,
     }
+    act_as(world, 0)
+    settings, agent = world.settings, world.agent
     world.configure(**{name: value for name, value in chosen.items() if value is not None})
     if world.settings.snap_to_grid:
         snap_to_grid(world)
+    if agentCount > 1 or world.others:
+        try:
+            set_agents(world, world.settings.agents)
+        except ActionFailed:
+            world.settings = settings
+            world.place_agent(agent)
+            raise
     return {"cameraNearPlane": NEAR_PLANE, "cameraFarPlane": _FAR_PLANE}
 
 

@@ -129,7 +129,7 @@ def set_object_states(world: World, *, SetObjectStates: ObjectStates | None = No
             suits
             and world.exists[i]
             and world.has(i, wanted.stateChange)
-            and i not in world.in_hand
+            and i not in world.carried
         ):
             if state == "isOpen":
                 set_openness(world, i, float(value))

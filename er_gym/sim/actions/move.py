@@ -13,6 +13,7 @@ from er_gym.sim.actions.rotate_look import LOOK_LIMITS, LOOK_TOLERANCE
 from er_gym.sim.actions.vectors import Vector
 from er_gym.sim.agent import Agent
 from er_gym.sim.errors import ActionFailed
+from er_gym.sim.space.bodies import blocking
 from er_gym.sim.space.room_bounds import room_corners
 from er_gym.sim.space.walkable_floor import floor_of, standing_places
 from er_gym.sim.world import World
@@ -34,22 +35,27 @@ def _step(
     heading: float,
     near: tuple[str, float] | None = None,
     keep_hand: bool = False,
+    through_agents: bool = False,
 ) -> None:
     """Step in a direction.
 
     Args:
         near: the id of an object, and how far from it the agent may end, metres.
         keep_hand: whether the hand stays as it is.
+        through_agents: whether other agents are no obstacle.
     """
     size = world.settings.grid_size if magnitude is None else magnitude
     if size <= 0:
         raise ActionFailed(f"moveMagnitude must be > 0, not {size:g}.")
     if size > _FARTHEST:
-        raise ActionFailed(f"{_WALL} is blocking Agent 0 from moving by {size:g} m.")
+        raise ActionFailed(f"{_WALL} is blocking Agent {world.acting} from moving by {size:g} m.")
     start, end = world.agent.position, step_end(world, size, heading)
-    if not floor_of(world.scene.name).path_is_clear(start[[0, 2]], end[[0, 2]]):
+    clear = floor_of(world.scene.name).path_is_clear(start[[0, 2]], end[[0, 2]])
+    met = blocking(world, start, end) if clear and world.others and not through_agents else None
+    if not clear or met is not None:
         by = ", ".join(f"{part + 0.0:.4f}" for part in (end - start).round(4).tolist())
-        raise ActionFailed(f"{_obstacle(world, end)} is blocking Agent 0 from moving by ({by}).")
+        what = _obstacle(world, end) if met is None else f"Agent {met}"
+        raise ActionFailed(f"{what} is blocking Agent {world.acting} from moving by ({by}).")
     if near is not None:
         _stay_near(world, end, *near)
     world.place_agent(replace(world.agent, position=end), keep_hand=keep_hand)
@@ -145,11 +151,12 @@ def _mover(heading: float) -> Callable[..., None]:
         """Step by moveMagnitude metres (default: gridSize) without turning.
 
         With ``objectId``, the agent stays within ``maxAgentsDistance`` metres of that object.
-        ``manualInteract`` leaves the hand as it is. All other arguments have no effect: the held
-        object collides with nothing here.
+        ``manualInteract`` leaves the hand as it is. With ``allowAgentsToIntersect`` other agents
+        are no obstacle. All other arguments have no effect: the held object collides with nothing
+        here.
         """
         near = (objectId, maxAgentsDistance) if objectId and maxAgentsDistance > 0.0 else None
-        _step(world, moveMagnitude, heading, near, manualInteract)
+        _step(world, moveMagnitude, heading, near, manualInteract, allowAgentsToIntersect)
 
     return move
 

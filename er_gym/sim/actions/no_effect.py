@@ -21,7 +21,7 @@ _LONGEST = 1e9
 )
 def do_nothing(world: World) -> None:
     """Accepted: no time passes here, everything loose can be moved, nothing breaks by itself, and
-    the agent is in no picture."""
+    agents have no face."""
 
 
 @action("Sleep")
@@ -49,7 +49,7 @@ def set_top_level_view(world: World, *, topView: bool = False) -> None:
 
 @action("ChangeAgentColor")
 def change_agent_color(world: World, *, x: float, y: float, z: float) -> None:
-    """Accepted: the agent is in no picture."""
+    """Accepted: each agent has a colour of its own here."""
 
 
 @action("RandomizeSmoothness")

@@ -8,6 +8,7 @@ from er_gym.sim import consequences
 from er_gym.sim.actions.checks import require, target, within
 from er_gym.sim.actions.object_action import object_action
 from er_gym.sim.actions.registry import action
+from er_gym.sim.crew import whose_hand
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.placement_restrictions import accepts
 from er_gym.sim.space.landing import landing
@@ -32,6 +33,8 @@ def pickup_object(
     """Take an object and all its contents into the empty hand."""
     i = target(world, objectId, forceAction)
     require(world, i, "pickupable", "something that can be picked up")
+    if world.held_elsewhere and i in world.carried and i not in world.in_hand:
+        raise ActionFailed(f"{objectId} is in {whose_hand(world, i)}.")
     if world.held >= 0:
         raise ActionFailed(
             f"The agent's hand holds {world.object_ids[world.held]} already; put it down first."
@@ -48,8 +51,7 @@ def put_down(world: World, i: int, yaw: float, foot: np.ndarray, parents: list[i
     underside = (world.low[i] + world.high[i]) / 2
     underside[1] = world.low[i, 1]
     world.move_by(i, foot - underside)
-    if i == world.held:
-        world.let_go()
+    world.release(i)
     world.relocate(i, parents)
     consequences.apply(world)
 
@@ -87,6 +89,8 @@ def put_object(
     require(world, receptacle, "receptacle", "a receptacle")
     if receptacle in world.in_hand:
         raise ActionFailed(f"{objectId} is in the agent's own hand.")
+    if receptacle in world.carried:
+        raise ActionFailed(f"{objectId} is in {whose_hand(world, receptacle)}.")
     shut = next((r for r in (receptacle, *world.ancestors(receptacle)) if world.is_shut(r)), None)
     if shut is not None:
         raise ActionFailed(

@@ -50,8 +50,7 @@ def _sane(*vectors: Vector | None) -> None:
 
 def _settle(world: World, i: int, stays: bool) -> None:
     """Update the receptacles of object i. If it is in none, it falls, unless it ``stays``."""
-    if i == world.held:
-        world.let_go()
+    world.release(i)
     parents = receptacles_of(world, i)
     if parents or stays:
         world.relocate(i, parents)
@@ -159,7 +158,7 @@ def teleport_object(
         raise ActionFailed("Give a position, or positions, to teleport the object to.")
     _sane(rotation, *wanted)
     i = _loose(world, objectId)
-    if i == world.held and not allowTeleportOutOfHand:
+    if world.is_held(i) and not allowTeleportOutOfHand:
         raise ActionFailed("Cannot teleport object while it is being held.")
     obstacle = None
     for each in wanted:

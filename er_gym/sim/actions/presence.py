@@ -55,7 +55,7 @@ def enable_object(world: World, *, objectId: str) -> None:
         world.find(objectId)
         return
     lay_in_it = world.enable(i)
-    back = [k for k in lay_in_it if world.exists[k] and k not in world.in_hand]
+    back = [k for k in lay_in_it if world.exists[k] and k not in world.carried]
     # Large objects first: things on a plate are also in every receptacle that the plate is in.
     size = np.prod(world.high - world.low, axis=1)
     for k in sorted({i, *back}, key=lambda k: -float(size[k])):

@@ -31,7 +31,7 @@ def _slide(world: World, i: int, heading: float, newtons: float) -> None:
         heading: degrees clockwise from +z.
         newtons: the force.
     """
-    if i == world.held:
+    if world.is_held(i):
         raise ActionFailed("Please use Throw for an item in the Agent's Hand.")
     if not (world.has(i, "pickupable") or world.has(i, "moveable")):
         raise ActionFailed("Target Primary Property type incompatible with push/pull.")
@@ -124,7 +124,7 @@ def touch_then_apply_force(
     away = float(np.linalg.norm(np.clip(camera, world.low[i], world.high[i]) - camera))
     if away > handDistance:
         return _touch("", handDistance)
-    pushed = i != world.held and (world.has(i, "pickupable") or world.has(i, "moveable"))
+    pushed = not world.is_held(i) and (world.has(i, "pickupable") or world.has(i, "moveable"))
     if pushed and np.hypot(direction.x, direction.z) > 0.0:
         heading = float(np.degrees(np.arctan2(direction.x, direction.z)))
         _slide(world, i, world.agent.rotation + heading, newtons)

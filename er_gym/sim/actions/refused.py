@@ -48,7 +48,7 @@ _BY_REASON = {
         "InitializeTableSetting PlaceFixedReceptacleAtLocation PlaceBookWallAtLocation "
         "PointsOverTableWhereHandCanBe"
     ),
-    "it is for several agents that lift furniture, and there is one agent here": (
+    "it is for agents that carry furniture together, and no furniture is lifted here": (
         "MoveLiftedObjectAhead MoveLiftedObjectBack MoveLiftedObjectLeft MoveLiftedObjectRight "
         "RotateLiftedObjectRight MoveAgentsAheadWithObject MoveAgentsBackWithObject "
         "MoveAgentsLeftWithObject MoveAgentsRightWithObject"

@@ -28,6 +28,7 @@ from typing import Any, get_type_hints
 from er_gym.plugins import PluginError, added_objects
 from er_gym.sim.actions.conversion import Kind, Unconvertible, kind_of
 from er_gym.sim.actions.refused import REFUSED
+from er_gym.sim.crew import act_as, numbers
 from er_gym.sim.errors import (
     INVALID_ACTION,
     INVALID_ARGUMENT,
@@ -218,12 +219,15 @@ def load_added() -> None:
 
 
 def perform(world: World, request: Mapping[str, Any]) -> Any:
-    """Do an action and return its ``actionReturn``.
+    """Let the agent of the request do an action, and return its ``actionReturn``.
 
     Raises:
-        WrongCall: there is no such action, or the call is invalid.
+        WrongCall: there is no such action or agent, or the call is invalid.
         ActionFailed: the action is not possible in this state of the world.
     """
+    agent = request.get("agentId")
+    if agent or world.acting:
+        _take_turn(world, agent)
     name = request.get("action")
     signatures = ACTIONS.get(name) if isinstance(name, str) else None
     if signatures is None:
@@ -234,6 +238,26 @@ def perform(world: World, request: Mapping[str, Any]) -> Any:
         else max(signatures, key=lambda each: each.knows(request))
     )
     return signature.run(world, **signature.arguments(request, signatures))
+
+
+_AGENT_ID = kind_of(int)
+
+
+def _take_turn(world: World, agent: Any) -> None:
+    """Let the agent of this id act; None is the first one."""
+    there = numbers(world)
+    try:
+        number = 0 if agent is None else _AGENT_ID.convert(agent)
+    except Unconvertible:
+        number = -1
+    if number not in there:
+        which = "the only agent is 0" if len(there) == 1 else f"agents are 0 to {there[-1]}"
+        raise WrongCall(
+            f"agentId is {_shown(agent)}, and {which}; agentCount of Initialize sets how many "
+            "there are.",
+            INVALID_ARGUMENT,
+        )
+    act_as(world, number)
 
 
 def quoted(value: object) -> str:

@@ -15,9 +15,10 @@ from er_gym.sim.agent import Agent
 from er_gym.sim.carrying import camera_rotation
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.object_metadata import vector
+from er_gym.sim.space.bodies import hidden, hiding
 from er_gym.sim.space.line_of_sight_builder import lines_of_sight
 from er_gym.sim.space.solids.sample_points import sample_points
-from er_gym.sim.space.visibility import visible
+from er_gym.sim.space.visibility import Sight, seen_by, visible
 from er_gym.sim.world import World
 
 _SCHEMES = ("distance", "collider")
@@ -49,13 +50,12 @@ def get_visible_objects(
             "or 'collider'."
         )
     settings = world.settings
-    position, camera, lens = _camera(world, thirdPartyCameraIndex)
-    known = lines_of_sight(world)
-    found = known.look(camera, (*lens, settings.width / settings.height))
+    position, camera, angles = _camera(world, thirdPartyCameraIndex)
     distance = settings.visibility_distance if maxDistance is None else maxDistance
     within("maxDistance", distance, 0.0, np.inf)
-    near = known.within_distance(position, distance)
-    found = found.copy() if near is None else found & near
+    bodies = hiding(world, own=thirdPartyCameraIndex is not None)
+    lens = (*angles, settings.width / settings.height)
+    found = seen_by(world, Sight(position, camera, lens, distance, bodies))
     found[[i for i in world.in_hand if not world.hidden[i]]] = True
     rows = None if objectIds is None else {world.find(each) for each in objectIds}
     seen = np.flatnonzero(found).tolist()
@@ -204,9 +204,9 @@ def approx_percent_of_screen(world: World, *, objectId: str) -> float:
     """The share of the picture that the rectangle around an object's seen points takes."""
     i = world.find(objectId)
     points = sample_points(world, i)
-    clear = lines_of_sight(world).unobstructed(
-        world.agent.camera[None], points.astype(np.float32), i
-    )[0]
+    eye, targets = world.agent.camera[None], points.astype(np.float32)
+    clear = lines_of_sight(world).unobstructed(eye, targets, i)[0]
+    clear &= ~hidden(hiding(world), eye, targets)[0]
     at = _in_viewport(world, points)
     inside = clear & (at[:, 2] > 0.0) & ((at[:, :2] > 0.0) & (at[:, :2] < 1.0)).all(axis=1)
     if world.hidden[i] or not inside.any():

@@ -12,6 +12,7 @@ from er_gym.sim import consequences
 from er_gym.sim.actions.checks import require, target
 from er_gym.sim.actions.object_action import object_action
 from er_gym.sim.actions.registry import quoted
+from er_gym.sim.crew import whose_hand
 from er_gym.sim.errors import ActionFailed
 from er_gym.sim.world import World
 
@@ -32,8 +33,10 @@ def slice_object(world: World, *, objectId: str, forceAction: bool = False) -> N
     """Slice an object: its slices replace it. An egg cracks open."""
     i = target(world, objectId, forceAction)
     require(world, i, "sliceable", "something that can be sliced")
-    if i == world.held:
-        raise ActionFailed(f"{objectId} is in the agent's hand; put it down before slicing it.")
+    if world.is_held(i):
+        raise ActionFailed(
+            f"{objectId} is in {whose_hand(world, i)}; put it down before slicing it."
+        )
     _cut_up(world, i, "isSliced")
 
 
@@ -74,9 +77,9 @@ def _break(world: World, i: int) -> None:
     """Break object i; an egg cracks open."""
     if world.types[i] != "Egg":
         world.set_state(i, "isBroken", True)
-    elif i == world.held:
+    elif world.is_held(i):
         raise ActionFailed(
-            f"{world.object_ids[i]} is in the agent's hand; put it down before breaking it."
+            f"{world.object_ids[i]} is in {whose_hand(world, i)}; put it down before breaking it."
         )
     else:
         _cut_up(world, i, "isBroken")

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.look import OWN, Line, Look
+from er_gym.sim.render.agent_body import body_node, put_body
 from er_gym.sim.render.appearance import Appearance, appearance_of
 from er_gym.sim.render.bake import bake_of, heading_of, look_of
 from er_gym.sim.render.camera import Camera
@@ -43,6 +44,8 @@ _SCENES = 64
 _SHOWN: dict[str, CacheKey[object]] = {
     light: CacheKey(f"state that a scene graph in {light} light shows") for light in (SOFT, FLAT)
 }
+_AFTER = 1 << 20
+"""Agents come last in the order of drawing."""
 _BEFORE = 8
 """The parts of the room come first in the order of drawing: they start this far below 0."""
 
@@ -87,14 +90,25 @@ class SceneGraph:
         self._state: object | None = object()  # the state that it shows; None while it changes
 
     def draw(
-        self, world: World, camera: Camera, depth: bool = False, *, ids: bool = True
+        self,
+        world: World,
+        camera: Camera,
+        depth: bool = False,
+        *,
+        ids: bool = True,
+        unseen: int | None = None,
     ) -> Frames:
         """The images of a camera in a world of this scene; object i is instance i + 1.
 
         Several threads may call this at once; they take turns.
+
+        Args:
+            unseen: the agent whose body is left out; one agent alone has no body.
         """
         with DRAWING:
             self._follow(world)
+            if world.others or self._bodies:
+                self._stand(world, unseen)
             veils = self._veils if self._soft else None
             return rasteriser().draw(self._root, camera, depth, ids=ids, veils=veils)
 
@@ -109,6 +123,7 @@ class SceneGraph:
         # objects are hidden.
         self._touched: set[int] = set()
         self._lines: dict[Line, Any] = {}
+        self._bodies: dict[int, Any] = {}
         self._hidden: NDArray[np.bool_] | None = None
         for k, part in enumerate(bake.around):
             self._root.attachNewNode(self._part(part, 0), k - _BEFORE)
@@ -123,7 +138,7 @@ class SceneGraph:
         if before is None:  # an exception left it half updated
             self._build(self._lamps, self._look)
         elif world.cache.state.get(self._key) is before:
-            for i in world.in_hand:  # nothing but the hand has moved
+            for i in world.carried:  # nothing but the hands has moved
                 if i in self._placed:
                     self._place(world, i, self._placed[i].order)
             self._state = before
@@ -152,6 +167,23 @@ class SceneGraph:
             self._draw_lines(world.lines)
         self._touched, self._hidden = set(world.touched), hidden.copy()
         self._state = world.cache.state.put(self._key, object())
+
+    def _stand(self, world: World, unseen: int | None) -> None:
+        """Put the bodies of the agents, all but one, where they are."""
+        agents = {number: other.agent for number, other in world.others.items()}
+        if agents:
+            agents[world.acting] = world.agent
+        if not world.settings.agents_visible:
+            agents = {}
+        for number in self._bodies.keys() - agents.keys() | {unseen}:
+            if number in self._bodies:
+                self._bodies.pop(number).removeNode()
+        for number, agent in sorted(agents.items()):
+            if number == unseen:
+                continue
+            if number not in self._bodies:
+                self._bodies[number] = self._root.attachNewNode(body_node(number), _AFTER + number)
+            put_body(self._bodies[number], agent)
 
     def _draw_lines(self, lines: tuple[Line, ...]) -> None:
         for gone in self._lines.keys() - set(lines):
@@ -205,7 +237,7 @@ class SceneGraph:
     def _place(self, world: World, i: int, order: int) -> None:
         seen, solid, before = appearance_of(world, i), solid_of(world, i), self._placed.get(i)
         heading, place = heading_of(solid), place_of(solid)
-        lit_at = place if self._soft and i not in world.in_hand else None
+        lit_at = place if self._soft and i not in world.carried else None
         same = before is not None and before.shows(seen, heading)
         look = before.look if before is not None and same else look_of(seen, heading)
         if before is None or (before.look, before.order, before.lit_at) != (look, order, lit_at):
@@ -230,7 +262,7 @@ class SceneGraph:
         changed = not world.touched.isdisjoint((i, *on)) or i >= len(world.scene)
         depends: tuple[object, ...] = ()
         if changed:
-            held = i in world.in_hand
+            held = i in world.carried
             depends = (solid_of(world, i), order, held, on, *(solid_of(world, p) for p in on))
         if before is not None and _all_same(before.depends, depends):
             return

@@ -90,7 +90,7 @@ def shade_of(world: World, i: int, order: int, day: Daylight) -> Piece | None:
     Args:
         order: in which it is drawn.
     """
-    if world.types[i] in _NONE or i in world.in_hand:
+    if world.types[i] in _NONE or i in world.carried:
         return None
     solid = solid_of(world, i)
     low = solid.boxes[:, 0].min(axis=0)

@@ -110,7 +110,7 @@ def _inward(shell: Shell | None, centre: NDArray[np.float64], axis: int) -> floa
 
 def lamps_on(world: World) -> tuple[Lamp, ...]:
     """The lamps of a world that are on. One in the hand lights nothing."""
-    found, hand = [], world.in_hand
+    found, hand = [], world.carried
     for kind, (strength, distance) in _LAMPS.items():
         for i in world.of_type(kind):
             if world.state(i, "isToggled") and not world.hidden[i] and i not in hand:

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.agent import Agent
+from er_gym.sim.crew import MOST_AGENTS
 from er_gym.sim.look import Look
 from er_gym.sim.metadata import instance_color
 from er_gym.sim.render.camera import Camera
 from er_gym.sim.settings import Settings, ThirdPartyCamera
+from er_gym.sim.space.bodies import body_of, in_sight
 from er_gym.sim.space.map_camera import map_camera
 from er_gym.sim.world import World
 from er_gym.sim.world_cache import CacheKey
@@ -53,20 +55,25 @@ class _Kept:
     """A view and the parts of the world that it shows, besides the state of the objects."""
 
     agent: Agent
+    others: tuple[Agent, ...]
     settings: Settings
     cameras: tuple[ThirdPartyCamera, ...]
     map_view: bool
     look: Look
     view: View
 
-    def shows(self, world: World) -> bool:
+    def shows(self, world: World, others: tuple[Agent, ...]) -> bool:
         # A moving agent is replaced as a whole, and the held object moves only with it.
         same = self.agent is world.agent and self.settings == world.settings
         same = same and self.cameras == world.cameras and self.map_view == world.map_view
+        same = same and len(self.others) == len(others)
+        same = same and all(a is b for a, b in zip(self.others, others, strict=True))
         return same and self.look == world.look
 
 
-_VIEW: CacheKey[_Kept] = CacheKey("view")
+_VIEWS: tuple[CacheKey[_Kept], ...] = tuple(
+    CacheKey(f"view of agent {number}") for number in range(MOST_AGENTS)
+)
 
 
 def with_flags(settings: Settings, request: Mapping[str, Any]) -> Settings:
@@ -78,21 +85,44 @@ def with_flags(settings: Settings, request: Mapping[str, Any]) -> Settings:
     return replace(settings, **asked) if asked else settings
 
 
-def draw(world: World) -> View:
-    """Draw the world as the agent and the third-party cameras see it now.
+def draw(world: World, third_party: tuple[View, ...] | None = None) -> View:
+    """Draw the world as the acting agent and the third-party cameras see it now.
 
     The last view is returned again as long as nothing has changed.
+
+    Args:
+        third_party: the views of the third-party cameras, if they are drawn already.
     """
-    kept = world.cache.state.get(_VIEW)
-    if kept is not None and kept.shows(world):
+    key, others = _VIEWS[world.acting], _others_shown(world)
+    kept = world.cache.state.get(key)
+    if kept is not None and kept.shows(world, others):
         return kept.view
-    first, *others = (_draw(world, camera) for camera in _cameras(world))
-    view = replace(first, third_party=tuple(others))
+    own, *cameras = _cameras(world)
+    if third_party is None:
+        third_party = tuple(_draw(world, *camera) for camera in cameras)
+    view = replace(_draw(world, *own), third_party=third_party)
     world.cache.state.put(
-        _VIEW,
-        _Kept(world.agent, world.settings, world.cameras, world.map_view, world.look, view),
+        key,
+        _Kept(world.agent, others, world.settings, world.cameras, world.map_view, world.look, view),
     )
     return view
+
+
+def _others_shown(world: World) -> tuple[Agent, ...]:
+    """The poses of the other agents that may be in a picture, with what they hold."""
+    others = [other for _, other in sorted(world.others.items())]
+    if world.map_view or world.cameras:
+        return tuple(other.agent for other in others)
+    camera, settings = world.agent.camera, world.settings
+    lens = (
+        *(world.agent.rotation, world.agent.horizon, settings.field_of_view),
+        settings.width / settings.height,
+    )
+    return tuple(
+        other.agent
+        for other in others
+        if other.held >= 0 or in_sight(body_of(other.agent), camera, lens)
+    )
 
 
 def seen_at(world: World, x: float, y: float) -> tuple[int | None, float, Camera]:
@@ -102,8 +132,8 @@ def seen_at(world: World, x: float, y: float) -> tuple[int | None, float, Camera
     Args:
         x, y: 0 to 1, from the left and from the top.
     """
-    settings, camera = world.settings, next(_cameras(world))
-    frames = _frames(world, camera, depth=True)
+    settings, (camera, unseen) = world.settings, next(_cameras(world))
+    frames = _frames(world, camera, unseen, depth=True)
     column = min(int(x * settings.width), settings.width - 1)
     row = min(int(y * settings.height), settings.height - 1)
     seen = int(frames.ids[row, column])
@@ -111,15 +141,17 @@ def seen_at(world: World, x: float, y: float) -> tuple[int | None, float, Camera
     return seen - 1 if seen else None, float(frames.depth[row, column]), camera
 
 
-def _cameras(world: World) -> Iterator[Camera]:
+def _cameras(world: World) -> Iterator[tuple[Camera, int | None]]:
+    """The cameras, each with the agent whose body it does not show: its own."""
     settings, agent = world.settings, world.agent
     size = settings.width, settings.height
     if world.map_view:
-        yield _camera(map_camera(world.scene.name), size)
+        yield _camera(map_camera(world.scene.name), size), None
     else:
-        yield Camera(agent.camera, agent.rotation, agent.horizon, settings.field_of_view, *size)
+        fov = settings.field_of_view
+        yield Camera(agent.camera, agent.rotation, agent.horizon, fov, *size), world.acting
     for camera in world.cameras:
-        yield _camera(camera, size)
+        yield _camera(camera, size), None
 
 
 def _camera(camera: ThirdPartyCamera, size: tuple[int, int]) -> Camera:
@@ -135,9 +167,9 @@ def _camera(camera: ThirdPartyCamera, size: tuple[int, int]) -> Camera:
     )
 
 
-def _draw(world: World, camera: Camera) -> View:
+def _draw(world: World, camera: Camera, unseen: int | None) -> View:
     settings = world.settings
-    frames = _frames(world, camera, settings.render_depth, ids=settings.draws_colors)
+    frames = _frames(world, camera, unseen, settings.render_depth, ids=settings.draws_colors)
     view = View(
         frames.rgb,
         frames.depth,
@@ -151,12 +183,14 @@ def _draw(world: World, camera: Camera) -> View:
     return view
 
 
-def _frames(world: World, camera: Camera, depth: bool = False, *, ids: bool = True) -> Frames:
+def _frames(
+    world: World, camera: Camera, unseen: int | None, depth: bool = False, *, ids: bool = True
+) -> Frames:
     # Most worlds are never drawn.
     from er_gym.sim.render.scene_graph import scene_graph_of
 
     graph = scene_graph_of(world.scene.name, world.settings.light)
-    return graph.draw(world, camera, depth, ids=ids)
+    return graph.draw(world, camera, depth, ids=ids, unseen=unseen)
 
 
 def _colored(frames: Frames, names: Sequence[str]) -> NDArray[np.uint8]:

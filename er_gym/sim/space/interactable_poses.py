@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_gym.sim.agent import CAMERA_CROUCHING, CAMERA_STANDING, Agent
+from er_gym.sim.space.bodies import hidden, hiding
 from er_gym.sim.space.frustum import in_frustum
 from er_gym.sim.space.line_of_sight_builder import lines_of_sight
 from er_gym.sim.space.outlines import Outlines
@@ -64,7 +65,7 @@ def interactable_poses(
         found.setflags(write=False)
         return found
 
-    in_hand = i in world.in_hand
+    in_hand = i in world.carried
     one = len(positions) == len(rotations) == len(horizons) == len(standings) == 1
     if one and not in_hand and max_distance is None:
         # A caller who asks for one pose mostly goes there next, so this visibility is needed
@@ -75,7 +76,7 @@ def interactable_poses(
         return search()
     settings = world.settings
     lens = (settings.field_of_view, settings.width / settings.height)
-    question = (i, positions.tobytes(), wanted, lens, world.agent.position[1])
+    question = (i, positions.tobytes(), wanted, lens, world.agent.position[1], *hiding(world))
     return lines_of_sight(world).cached(question, search)
 
 
@@ -156,7 +157,7 @@ def _within_reach(
     away = np.abs(np.array(lines_of_sight(world).extent)[:, None] - positions).max(
         axis=0, initial=0.0
     )
-    if i not in world.in_hand and (np.hypot(away[:, 0], away[:, 1]) <= distance).all():
+    if i not in world.carried and (np.hypot(away[:, 0], away[:, 1]) <= distance).all():
         return positions  # everything in the room is within the distance
     return positions[Outlines.of([solid_of(world, i)]).gaps(positions)[:, 0] <= distance]
 
@@ -173,6 +174,9 @@ def _lines_to(
         found = middle + (found - middle) * share
     points = found.astype(np.float32)
     clear = lines_of_sight(world).unobstructed(eyes, points, i)
+    bodies = hiding(world)
+    if bodies:
+        clear = clear & ~hidden(bodies, eyes, points)
     away = (
         np.abs(eyes.max(axis=0) - points.min(axis=0)),
         np.abs(eyes.min(axis=0) - points.max(axis=0)),

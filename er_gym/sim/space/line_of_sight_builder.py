@@ -94,9 +94,9 @@ def compute_lines_of_sight(world: World) -> LinesOfSight:
 
 
 def _concealed(world: World) -> NDArray[np.bool_]:
-    """(N,) objects that are in something closed, in the hand or out of the scene."""
+    """(N,) objects that are in something closed, in a hand or out of the scene."""
     found = world.hidden.copy()
-    found[world.in_hand] = True
+    found[world.carried] = True
     return found
 
 
