@@ -25,8 +25,13 @@ def act_as(world: World, number: int) -> None:
         return
     others = dict(world.others)
     own = others.pop(number)
-    others[world.acting] = Waiting(world.agent, world.held, world.hand, world.map_view)
+    field_of_view = world.settings.field_of_view
+    others[world.acting] = Waiting(
+        world.agent, field_of_view, world.held, world.hand, world.map_view
+    )
     world.acting = number
+    if own.field_of_view != field_of_view:
+        world.configure(field_of_view=own.field_of_view)
     world.agent, world.held, world.hand = own.agent, own.held, own.hand
     world.map_view = own.map_view
     world.wait(others)

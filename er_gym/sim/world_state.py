@@ -118,13 +118,14 @@ def _agent_of(plain: Sequence[Any]) -> Agent:
 
 
 def _plain_waiting(other: Waiting) -> list[Any]:
-    return [_plain_agent(other.agent), other.held, _plain_hand(other.hand), other.map_view]
+    hand = _plain_hand(other.hand)
+    return [_plain_agent(other.agent), other.field_of_view, other.held, hand, other.map_view]
 
 
 def _waiting_of(
-    agent: Sequence[Any], held: int, hand: Sequence[Any] | None, map_view: bool
+    agent: Sequence[Any], fov: float, held: int, hand: Sequence[Any] | None, map_view: bool
 ) -> Waiting:
-    return Waiting(_agent_of(agent), held, _hand_of(hand), map_view)
+    return Waiting(_agent_of(agent), fov, held, _hand_of(hand), map_view)
 
 
 def _plain_hand(hand: Hand | None) -> list[Any] | None:

@@ -191,6 +191,31 @@ def test_all_pictures_of_all_cameras_are_the_same(server):
                 assert set(mine) == set(its) != set()
 
 
+def test_every_agents_event_is_the_same(server):
+    settings = {**ALL_PICTURES, "agentCount": 3}
+    with (
+        launch(**settings, **server) as played,
+        EmbeddedController(scene="FloorPlan1", **SMALL, **settings) as ours,
+    ):
+        requests = [
+            {"action": "AddThirdPartyCamera", **CORNER},
+            {"action": "RotateRight", "agentId": 1},
+            {"action": "GetReachablePositions", "agentId": 2},
+            {"action": "GetReachablePositions", "agentId": 2},
+            {"action": "MoveAhead", "agentId": 2, "renderImage": False},
+            {"action": "Fly", "agentId": 1},
+            {"action": "Pass", "agentId": 7},
+            {"action": "LookDown"},
+        ]
+        for request in requests:
+            (one, said), (other, told) = do(played, request), do(ours, request)
+            assert said == told, request
+            assert len(one.events) == len(other.events) == 3
+            assert one.metadata["agentId"] == other.metadata["agentId"]
+            for mine, its in zip(one.events, other.events, strict=True):
+                assert_same(mine, its)
+
+
 def test_depth_comes_in_the_format_that_the_client_wants(server):
     """1.653 m to the fridge's front, see test_controller."""
     millimetres = ai2thor.server.DepthFormat.Millimeters

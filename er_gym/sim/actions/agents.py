@@ -33,9 +33,10 @@ def set_agents(world: World, count: int) -> None:
         if world.held >= 0:
             fall(world, world.held, (world.low[world.held] + world.high[world.held]) / 2)
     act_as(world, 0)
+    fov = world.settings.field_of_view
     world.wait(
         {
-            number: Waiting(replace(agent, position=np.array([x, y, z])))
+            number: Waiting(replace(agent, position=np.array([x, y, z])), fov)
             for number, (x, z) in enumerate(places, start=1)
         }
     )
