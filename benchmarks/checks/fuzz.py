@@ -2,6 +2,7 @@
 
     python -m benchmarks.checks.fuzz --actions 100000 --seed 0 [--workers 2] [--scenes all|N|names]
     python -m benchmarks.checks.fuzz --actions 100000 --seed 0 --run 17    # one run, step by step
+    python -m benchmarks.checks.fuzz --actions 10000 --agents 4            # up to four in a room
 
 The actions are split into runs of 200 in a scene each. A run depends only on its number and the
 seed, so the same seed plays the same actions with any number of workers. The ``fingerprint`` at the
@@ -15,8 +16,8 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -25,14 +26,16 @@ from typing import Any
 
 import click
 
-from benchmarks.checks.fuzz_checks import Pictures, RoomChecker, floor, scene_of
+from benchmarks.checks.fuzz_checks import CompanyChecker, Pictures, floor, scene_of
 from benchmarks.checks.fuzz_report import FuzzPlan, FuzzReport, FuzzStep, show
 from benchmarks.checks.fuzz_requests import Request, Room, draw_request
 from benchmarks.checks.scene_jobs import play_options, run_scene_jobs, with_bar
 from benchmarks.terminal import echo
 from er_gym.sim.controller import EmbeddedController
+from er_gym.sim.crew import MOST_AGENTS
 from er_gym.sim.engine import Engine
 from er_gym.sim.errors import CLIENT_ERRORS
+from er_gym.sim.render.view import View
 from er_gym.sim.world import World
 
 _THROUGH_THE_CLIENT = 10
@@ -43,11 +46,13 @@ _INTERRUPTED = 130
 
 @dataclass
 class Outcome:
-    """The answer: plain metadata, the pictures, and the problems of the call itself."""
+    """The answer: plain metadata, the pictures, the problems of the call itself, and what the
+    agents are told that did not act."""
 
     metadata: dict[str, Any]
     pictures: Pictures
     problems: list[str] = field(default_factory=list)
+    others: list[Outcome] = field(default_factory=list)
 
 
 class EngineDriver:
@@ -62,10 +67,15 @@ class EngineDriver:
 
     def step(self, request: Request) -> Outcome:
         """Do an action."""
-        metadata, view = self._engine.step(request)
-        views = () if view is None else (view, *view.third_party)
-        drawn = [p for v in views for p in (v.rgb, v.depth, v.instances, v.classes)]
-        return Outcome(dict(metadata), [picture for picture in drawn if picture is not None])
+        outcome = _outcome(*self._engine.step(request))
+        outcome.others = [_outcome(*each) for each in self._engine.bystanders]
+        return outcome
+
+
+def _outcome(metadata: Mapping[str, Any], view: View | None) -> Outcome:
+    views = () if view is None else (view, *view.third_party)
+    drawn = [p for v in views for p in (v.rgb, v.depth, v.instances, v.classes)]
+    return Outcome(dict(metadata), [picture for picture in drawn if picture is not None])
 
 
 class ClientDriver:
@@ -97,17 +107,26 @@ class ClientDriver:
             raised and str(raised) != metadata["errorMessage"]
         ):
             problems.append(f"raised {raised!r}, not {due}, at {metadata['errorMessage']!r}")
-        # Not the depth, which the client squeezes: a picture a pixel high has no height.
-        drawn = (event.frame, event.instance_segmentation_frame)
-        return Outcome(metadata, [picture for picture in drawn if picture is not None], problems)
+        acting, *others = sorted(
+            map(_told, event.events),
+            key=lambda each: each.metadata["agentId"] != metadata["agentId"],
+        )
+        return replace(acting, problems=problems, others=others)
+
+
+def _told(event: Any) -> Outcome:
+    # Not the depth, which the client squeezes: a picture a pixel high has no height.
+    drawn = (event.frame, event.instance_segmentation_frame)
+    return Outcome(dict(event.metadata), [picture for picture in drawn if picture is not None])
 
 
 class FuzzRun:
     """A game in a scene: the player, the checker, and what they know of the scene."""
 
-    def __init__(self, by: type[EngineDriver] | type[ClientDriver]) -> None:
+    def __init__(self, by: type[EngineDriver] | type[ClientDriver], agents: int = 1) -> None:
         self._player = by()
-        self._checker = RoomChecker()
+        self._checker = CompanyChecker()
+        self._agents, self._there = agents, 1
         self._ids: dict[str, None] = {}
         self.metadata: dict[str, Any] = {}
         self.seconds = 0.0
@@ -119,15 +138,16 @@ class FuzzRun:
         self.seconds = time.perf_counter() - start
         self.metadata = answer.metadata
         self._ids.update(dict.fromkeys(entry["objectId"] for entry in self.metadata["objects"]))
-        seen = self._checker.sees(request, answer.metadata, answer.pictures, self._player.world)
-        return [*answer.problems, *seen]
+        told = [(each.metadata, each.pictures) for each in (answer, *answer.others)]
+        self._there = len(told)
+        return [*answer.problems, *self._checker.sees(request, told, self._player.world)]
 
     def room(self, random: Random, scenes: Sequence[str]) -> Room:
         """The knowledge from which the next request is drawn."""
         there = {entry["objectId"] for entry in self.metadata["objects"]}
         gone = [object_id for object_id in self._ids if object_id not in there]
         places = floor(self._player.world.scene.name, 0.25)
-        return Room(random, scenes, self.metadata, places, gone)
+        return Room(random, scenes, self.metadata, places, gone, self._agents, self._there)
 
 
 def play(plan: FuzzPlan, run: int) -> Iterator[FuzzStep]:
@@ -143,8 +163,11 @@ def play(plan: FuzzPlan, run: int) -> Iterator[FuzzStep]:
             warnings.simplefilter("always")
             try:
                 if game is None:
-                    game = FuzzRun(by)
+                    game = FuzzRun(by, plan.agents)
                     problems += game.do(request)
+                    if plan.agents > 1:
+                        count = 1 + random.randrange(plan.agents)
+                        problems += game.do({"action": "Initialize", "agentCount": count})
                 scene = scene_of(game.metadata)
                 request = draw_request(game.room(random, plan.scenes))
                 problems += game.do(request)
@@ -186,10 +209,19 @@ def fuzz(plan: FuzzPlan, workers: int) -> Iterator[FuzzReport]:
 
 @click.command()
 @play_options(actions=10_000)
+@click.option(
+    "--agents",
+    default=1,
+    show_default=True,
+    type=click.IntRange(1, MOST_AGENTS),
+    help="The most agents in a room.",
+)
 @click.option("--run", type=click.IntRange(0), help="Play only this run, and print every step.")
-def main(scenes: list[str], actions: int, seed: int, workers: int, run: int | None) -> None:
+def main(
+    scenes: list[str], actions: int, seed: int, workers: int, agents: int, run: int | None
+) -> None:
     """Play random actions, valid and absurd, and check the invariants."""
-    plan = FuzzPlan(seed, actions, tuple(scenes))
+    plan = FuzzPlan(seed, actions, tuple(scenes), agents)
     total, start, code = FuzzReport(), time.perf_counter(), 0
     if run is not None:
         if run >= plan.runs:

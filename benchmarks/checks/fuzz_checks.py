@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
-from math import isfinite
+from math import hypot, inf, isfinite
 from typing import Any
 
 import msgpack  # type: ignore[import-untyped]  # what the player sends metadata with
@@ -17,9 +17,11 @@ from benchmarks.checks.invariants import (
     Metadata,
     a_refusal_changed_nothing,
     floor_of,
+    hand_agrees,
     stands_on_the_floor,
     values_are_plain,
 )
+from er_gym.sim.crew import as_agent
 from er_gym.sim.object_metadata import objects as objects_of
 from er_gym.sim.scene import load_scene
 from er_gym.sim.settings import Settings
@@ -51,11 +53,18 @@ QUESTIONS = frozenset(
     }
 )
 """Actions that change nothing, whether they succeed or fail."""
+PLACING = frozenset({"Reset", "Initialize", "CreateHouse"})
+"""Actions that place agents which do not act."""
+_STEPS = frozenset({"MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "MoveGlobal"})
+_BODIES = 0.4
+"""The least distance between two agents, metres."""
 _TELEPORTS = ("Teleport", "TeleportFull")
 _FLOOR_STEP = 0.05
 _ODD_TIMES = 25
 """The expensive checks run once in this many actions."""
-_OF_THE_OBJECTS = [invariant for invariant in INVARIANTS if invariant is not values_are_plain]
+_OF_THE_OBJECTS = [
+    invariant for invariant in INVARIANTS if invariant not in (values_are_plain, hand_agrees)
+]
 
 
 @lru_cache(maxsize=128)
@@ -154,7 +163,7 @@ def cache_is_consistent(world: World, metadata: Metadata) -> Iterator[str]:
 
 
 class RoomChecker:
-    """Checks every event of one room, in order."""
+    """Checks every event that one agent of a room is told, in order."""
 
     def __init__(self) -> None:
         self.seen = 0
@@ -184,6 +193,34 @@ class RoomChecker:
             yield from self._kept_metadata_unchanged(metadata)
         self._settings = world.settings
 
+    def watches(
+        self, acted: Metadata, metadata: dict[str, Any], pictures: Pictures, world: World
+    ) -> Iterator[str]:
+        """All problems of what the agent is told after another agent's action.
+
+        Args:
+            acted: what the agent that acted is told.
+        """
+        before, self._before = self._before, metadata
+        self._settings = world.settings
+        yield from pictures_fit(pictures, metadata)
+        if before is None or before["objects"] != metadata["objects"]:
+            for invariant in _OF_THE_OBJECTS:
+                yield from invariant(metadata)
+        yield from can_be_serialised({**metadata, "objects": []})
+        if before is None:
+            return
+        name, number = acted["lastAction"], metadata["agentId"]
+        if not acted["lastActionSuccess"] or name in QUESTIONS:
+            yield from nothing_else_changed(before, {**metadata, "lastAction": name})
+        if before["agent"] != metadata["agent"] and name not in PLACING:
+            yield f"agent {number} did not act, and now is {metadata['agent']}"
+
+    @property
+    def before(self) -> Metadata | None:
+        """What the agent was told last."""
+        return self._before
+
     def _compared(
         self, request: Mapping[str, Any], before: Metadata, after: Metadata, world: World
     ) -> Iterator[str]:
@@ -203,3 +240,60 @@ class RoomChecker:
         if self._kept is not None and _packed(self._kept[0]) != self._kept[1]:
             yield f"the metadata of {_ODD_TIMES} actions ago have changed since"
         self._kept = metadata, _packed(metadata)
+
+
+class CompanyChecker:
+    """Checks what all agents of one room are told, in order."""
+
+    def __init__(self) -> None:
+        self._agents: dict[int, RoomChecker] = {}
+
+    def sees(
+        self,
+        request: Mapping[str, Any],
+        told: Sequence[tuple[dict[str, Any], Pictures]],
+        world: World,
+    ) -> Iterator[str]:
+        """All problems after this request.
+
+        Args:
+            told: the metadata and the pictures of each agent, first of the one that acted.
+        """
+        yield from hands_agree([metadata for metadata, _ in told])
+        agents = {metadata["agentId"] for metadata, _ in told}
+        self._agents = {k: self._agents.get(k, RoomChecker()) for k in agents}
+        (acted, pictures), *others = told
+        checker = self._agents[acted["agentId"]]
+        before = checker.before
+        yield from checker.sees(request, acted, pictures, world)
+        if before is not None and "allowAgentsToIntersect" not in request:
+            yield from keeps_apart(before, acted, [metadata for metadata, _ in others])
+        for metadata, shown in others:
+            number = metadata["agentId"]
+            own = as_agent(world, number)
+            yield from self._agents[number].watches(acted, metadata, shown, own)
+
+
+def hands_agree(told: Sequence[Metadata]) -> Iterator[str]:
+    """Each hand holds at most one object, and isPickedUp says which are in any."""
+    held = [entry for metadata in told for entry in metadata["inventoryObjects"]]
+    for metadata in told:
+        if len(metadata["inventoryObjects"]) > 1:
+            yield f"agent {metadata['agentId']} holds {metadata['inventoryObjects']}"
+        yield from hand_agrees({**metadata, "inventoryObjects": held})
+
+
+def keeps_apart(before: Metadata, after: Metadata, others: Sequence[Metadata]) -> Iterator[str]:
+    """No step brings an agent nearer to another than their bodies allow."""
+    if after["lastAction"] not in _STEPS or not after["lastActionSuccess"]:
+        return
+    for other in others:
+        was, now = (_apart(each, other) for each in (before, after))
+        if now < min(_BODIES, was) - 1e-5:
+            yield f"a step ends {now:.3f} m from agent {other['agentId']}, and began at {was:.3f}"
+
+
+def _apart(one: Metadata, other: Metadata) -> float:
+    """The distance between two agents, metres; infinite on different heights."""
+    (x, y, z), (to_x, to_y, to_z) = (each["agent"]["position"].values() for each in (one, other))
+    return hypot(to_x - x, to_z - z) if abs(to_y - y) < 1.8 else inf

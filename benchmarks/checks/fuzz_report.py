@@ -29,6 +29,7 @@ class FuzzPlan:
     seed: int = 0
     actions: int = STEPS
     scenes: Sequence[str] = tuple(SCENE_NAMES)
+    agents: int = 1
 
     @property
     def runs(self) -> int:

@@ -83,6 +83,8 @@ class Room:
         metadata: of the last event.
         positions: where the agent can stand in this scene.
         gone: ids of objects that no longer exist in this scene.
+        agents: the most that ``Initialize`` may ask for.
+        there: how many there are.
     """
 
     random: Random
@@ -90,6 +92,8 @@ class Room:
     metadata: Mapping[str, Any]
     positions: Sequence[dict[str, float]]
     gone: Sequence[str] = field(default=())
+    agents: int = 1
+    there: int = 1
 
     @property
     def objects(self) -> list[dict[str, Any]]:
@@ -270,7 +274,7 @@ SANE: dict[str, Draw] = {
     "fieldOfView": _between(30.0, 120.0),
     "visibilityDistance": _among(1.0, 1.5, 1.5, 3.0, 20.0),
     "rotateStepDegrees": _among(45.0, 90.0, 90.0, 90.0),
-    "agentCount": _among(1),
+    "agentCount": lambda room: room.random.choice(range(1, room.agents + 1)),
     "maxDistance": _among(0.5, 1.5, 5.0),
     "maxAgentsDistance": _among(-1.0, 0.5, 3.0),
     "maxStepCount": _among(1, 100, 10000),
@@ -414,6 +418,8 @@ def valid_request(room: Room) -> Request:
 def draw_request(room: Room) -> Request:
     """The next request; it shares nothing with the metadata or with another request."""
     random, request = room.random, valid_request(room)
+    if room.there > 1:
+        request["agentId"] = random.randrange(room.there)
     if random.random() < _PICTURE_RATE:
         request["renderImage"] = True
         for flag in ("renderInstanceSegmentation", "renderSemanticSegmentation"):
