@@ -32,6 +32,12 @@ class Agent:
     standing: bool = True
 
     @property
+    def eye(self) -> tuple[float, float, float]:
+        """:attr:`camera` as plain numbers, which is faster for one look."""
+        x, y, z = self.position.tolist()
+        return x, y + (CAMERA_STANDING if self.standing else CAMERA_CROUCHING), z
+
+    @property
     def camera(self) -> NDArray[np.float64]:
         """Position (3,) of the camera, metres."""
         lift = CAMERA_STANDING if self.standing else CAMERA_CROUCHING

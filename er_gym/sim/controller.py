@@ -108,9 +108,9 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
         event = self._event_of(metadata, frames)
         others = self.engine.bystanders
         if others:
-            events = [event, *(self._event_of(*each) for each in others)]
-            events.sort(key=lambda each: each.metadata["agentId"])
-            event = ai2thor.server.MultiAgentEvent(metadata["agentId"], events)
+            events, active = [self._event_of(*each) for each in others], metadata["agentId"]
+            events.insert(active, event)
+            event = ai2thor.server.MultiAgentEvent(active, events)
         self._event = event
 
     def _event_of(self, metadata: LazyMetadata, frames: View | None) -> EmbeddedEvent:

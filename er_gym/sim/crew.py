@@ -6,17 +6,10 @@ waits in ``World.others`` until one of them acts. With one agent nothing waits.
 
 from __future__ import annotations
 
-from copy import copy
-
 from er_gym.sim.waiting import Waiting
 from er_gym.sim.world import World
 
 MOST_AGENTS = 4
-
-
-def numbers(world: World) -> list[int]:
-    """The ids of all agents, in order."""
-    return sorted((world.acting, *world.others))
 
 
 def act_as(world: World, number: int) -> None:
@@ -39,8 +32,15 @@ def act_as(world: World, number: int) -> None:
 
 def as_agent(world: World, number: int) -> World:
     """The world as it is for one of its agents, to be read until something changes."""
-    found = copy(world)
+    found = copy_of(world)
     act_as(found, number)
+    return found
+
+
+def copy_of(world: World) -> World:
+    """A world of the same objects with poses of its own; to be read until an object changes."""
+    found = object.__new__(World)  # in a third of the time of copy.copy
+    vars(found).update(vars(world))
     return found
 
 

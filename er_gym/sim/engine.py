@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from weakref import ReferenceType, ref
 
 from er_gym.sim.actions import perform
-from er_gym.sim.crew import as_agent
+from er_gym.sim.crew import as_agent, copy_of
 from er_gym.sim.errors import ActionFailed, WrongCall
 from er_gym.sim.house.build import EMPTY, house_scene
 from er_gym.sim.lazy_metadata import LazyMetadata
@@ -17,6 +17,16 @@ from er_gym.sim.scene import SCENE_NAMES, UnknownSceneError, load_scene
 from er_gym.sim.settings import LIGHTS, SOFT, Settings
 from er_gym.sim.size import check_size
 from er_gym.sim.world import World
+
+_WALKS = frozenset(
+    {
+        *("MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "MoveGlobal", "Teleport"),
+        *("TeleportFull", "RotateLeft", "RotateRight", "LookUp", "LookDown", "RotateLook"),
+        *("Stand", "Crouch", "Pass", "Done", "GetReachablePositions", "GetInteractablePoses"),
+    }
+)
+"""Actions that change no object while the hand is empty."""
+_MOST_UNSETTLED = 64
 
 
 class Answer(NamedTuple):
@@ -84,34 +94,56 @@ class Engine:
         """Do one action, given as the AI2-THOR client sends it.
 
         This raises nothing. The metadata report every failure (``lastActionSuccess``,
-        ``errorMessage``, ``errorCode``). :attr:`bystanders` are the agents that did not act.
+        ``errorMessage``, ``errorCode``). :attr:`bystanders` are the agents that did not act,
+        in the order of their ids.
 
         Returns:
             The acting agent's metadata, and its images unless ``renderImage`` is False.
         """
         name = str(request.get("action"))
+        self.bystanders = ()
         if name == "Reset":  # it makes a new world, so the last metadata need not be settled
             answer = _answer(lambda: self._reset(request))
         else:
-            answer = self.do(lambda world: perform(world, request))
+            if not self._keeps_objects(name, request):
+                self._settle()
+            answer = _answer(lambda: perform(self.world, request))
         settings = self.world.settings
         self.world.settings = with_flags(settings, request)
-        report = metadata(self.world, name, *answer, self._kind)
-        frames = draw(self.world) if request.get("renderImage", True) else None
-        self._last = (ref(report),)
-        if self.world.others:
+        now, several = self.world, bool(self.world.others)
+        if several:
+            _ = now.nesting  # otherwise each copy computes its own
+            now = copy_of(now)
+        report = metadata(now, name, *answer, self._kind)
+        frames = draw(now) if request.get("renderImage", True) else None
+        if several:
             self.bystanders = self._watching(name, answer, frames)
-            self._last += tuple(ref(each.metadata) for each in self.bystanders)
+            told = (report, *(each.metadata for each in self.bystanders))
+            self._last = (*(each for each in self._last if each() is not None), *map(ref, told))
+        else:
+            self._last = (ref(report),)
         self.world.settings = settings
         return report, frames
 
+    def _keeps_objects(self, name: str, request: Mapping[str, Any]) -> bool:
+        """Whether an action of one of several agents leaves all objects as they are. Then what was
+        told before can be computed later: it is of a copy of the world, which has its own poses."""
+        world, agent = self.world, request.get("agentId")
+        if not world.others or name not in _WALKS or len(self._last) > _MOST_UNSETTLED:
+            return False
+        number = 0 if agent is None else agent
+        if type(number) is not int:
+            return False
+        other = world.others.get(number)
+        return (world if other is None else other).held < 0
+
     def _watching(self, name: str, answer: Answer, frames: View | None) -> tuple[Bystander, ...]:
-        """The agents that did not act; each is told again what it did itself."""
+        """The agents that did not act, by their ids; each is told again what it did itself."""
         if name == "Initialize" and not answer.error:
             self._did = {}  # all did
         self._did[self.world.acting] = name, answer
         found = []
-        for number in self.world.others:
+        for number in sorted(self.world.others):
             own = as_agent(self.world, number)
             did, told = self._did.setdefault(number, (name, answer))
             seen = None if frames is None else draw(own, frames.third_party)
@@ -121,11 +153,16 @@ class Engine:
     def do(self, act: Callable[[World], Any]) -> Answer:
         """Do something to the world, without metadata and images; what it raises is answered."""
         self.bystanders = ()
+        self._settle()
+        return _answer(lambda: act(self.world))
+
+    def _settle(self) -> None:
+        """Compute what readers may still want to know of the state before an action."""
         for each in self._last:
             last = each()
             if last is not None:
-                last.settle()  # its reader wants the state before this action
-        return _answer(lambda: act(self.world))
+                last.settle()
+        self._last = ()
 
     def _reset(self, request: Mapping[str, Any]) -> None:
         name = request.get("sceneName") or self.world.scene.name  # by default the same scene again
@@ -138,6 +175,5 @@ class Engine:
         now = self.world.settings
         fresh = Settings(width=now.width, height=now.height, light=now.light)
         chance = self.world.chance
-        self.bystanders = ()
         self.world = World.load(scene, fresh)
         self.world.chance = chance

@@ -20,6 +20,7 @@ from itertools import pairwise
 from typing import Any
 
 from er_gym.sim.engine import Engine
+from er_gym.sim.lazy_metadata import LazyMetadata
 from er_gym.sim.protocol import Field, images
 from er_gym.sim.render.view import View
 from er_gym.sim.size import check_size
@@ -69,15 +70,15 @@ class PlayerProcess:
             request = {**request, "renderImage": False}  # the client drops this event
         metadata, view = self._engine.step(request)
         said, shown = self._said, self._shown
-        events = [(metadata, view), *self._engine.bystanders]
-        events.sort(key=lambda event: event[0]["agentId"])
+        events: list[tuple[LazyMetadata, View | None]] = [*self._engine.bystanders]
+        active = metadata["agentId"]
+        events.insert(active, (metadata, view))
         self._said = [dict(each) for each, _ in events]
         self._shown = tuple(each for _, each in events if each is not None)
         same_images = len(shown) == len(self._shown)
         same_images &= all(a is b for a, b in zip(shown, self._shown, strict=False))
         if self._shown and not same_images:
             self._images = list(images(self._shown))
-        active = metadata["agentId"]
         before = said[active] if active < len(said) else {}
         changes = {
             name: value

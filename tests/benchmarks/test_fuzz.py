@@ -13,7 +13,13 @@ from click.testing import CliRunner
 
 from benchmarks.checks import fuzz as fuzz_script
 from benchmarks.checks.fuzz import fuzz, main, play, play_run
-from benchmarks.checks.fuzz_checks import QUESTIONS, can_be_serialised, floor, pictures_fit
+from benchmarks.checks.fuzz_checks import (
+    QUESTIONS,
+    CompanyChecker,
+    can_be_serialised,
+    floor,
+    pictures_fit,
+)
 from benchmarks.checks.fuzz_report import FuzzPlan, FuzzReport, show
 from benchmarks.checks.fuzz_requests import MUTATIONS, PARAMETERS, SANE, Room, draw_request
 from er_gym.sim import engine as engine_module
@@ -295,3 +301,48 @@ def test_an_interrupted_play_is_summed_up(monkeypatch):
     assert ran.exit_code == 130
     assert "interrupted; so far:" in ran.output
     assert "ok: 5 actions" in ran.output
+
+
+# -- several agents ----------------------------------------------------------------------------
+
+
+def test_several_agents_play_without_a_problem():
+    report = play_run(0, plan=FuzzPlan(seed=2, actions=60, scenes=("FloorPlan403",), agents=4))
+    assert not report.wrong
+    assert report.total.tries == 60
+
+
+def told(engine, **request):
+    """What each agent is told after a request, first the one that acted."""
+    metadata, _ = engine.step({"renderImage": False, **request})
+    every = [dict(metadata), *(dict(each.metadata) for each in engine.bystanders)]
+    return [(each, ()) for each in every]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "found"),
+    [
+        (lambda acted, other: other["agent"]["position"].update(x=9.0), "agent 1 did not act"),
+        (lambda acted, other: acted["agent"]["position"].update(z=0.1), "a step ends 0.100 m"),
+        (lambda acted, other: other.update(fov=50), "changed fov"),
+        (
+            lambda acted, other: other.update(
+                inventoryObjects=[{"objectId": "Apple|1", "objectType": "Apple"}]
+            ),
+            "the hand holds",
+        ),
+    ],
+)
+def test_what_is_wrong_about_several_agents_is_found(spoil, found):
+    engine, checker = Engine(32, 24), CompanyChecker()
+    told(engine, action="Reset", sceneName="FloorPlan1")
+    told(engine, action="Initialize", agentCount=2)
+    problems = list(checker.sees({}, told(engine, action="Pass"), engine.world))
+    assert not problems
+    # A refused step, which its metadata call a success to be checked as one.
+    seen = told(engine, action="MoveAhead", moveMagnitude=50)
+    seen[0][0].update(
+        lastActionSuccess="step" in found, errorMessage="" if "step" in found else "x"
+    )
+    spoil(seen[0][0], seen[1][0])
+    assert [each for each in checker.sees({}, seen, engine.world) if found in each]

@@ -182,7 +182,7 @@ def test_bodies_are_upright_cylinders():
 
 
 def test_a_body_is_in_sight_where_it_may_be_in_the_picture():
-    eye, lens = np.array([0.0, 1.575, 0.0]), (0.0, 0.0, 90.0, 1.0)
+    eye, lens = (0.0, 1.575, 0.0), (0.0, 0.0, 90.0, 1.0)
     assert in_sight((0.0, 0.9, 2.0), eye, lens)
     assert in_sight((2.0, 0.9, 2.0), eye, lens)
     assert not in_sight((0.0, 0.9, -2.0), eye, lens)

@@ -28,7 +28,7 @@ from typing import Any, get_type_hints
 from er_gym.plugins import PluginError, added_objects
 from er_gym.sim.actions.conversion import Kind, Unconvertible, kind_of
 from er_gym.sim.actions.refused import REFUSED
-from er_gym.sim.crew import act_as, numbers
+from er_gym.sim.crew import act_as
 from er_gym.sim.errors import (
     INVALID_ACTION,
     INVALID_ARGUMENT,
@@ -226,7 +226,7 @@ def perform(world: World, request: Mapping[str, Any]) -> Any:
         ActionFailed: the action is not possible in this state of the world.
     """
     agent = request.get("agentId")
-    if agent or world.acting:
+    if world.acting if agent is None else (type(agent) is not int or agent != world.acting):
         _take_turn(world, agent)
     name = request.get("action")
     signatures = ACTIONS.get(name) if isinstance(name, str) else None
@@ -245,19 +245,20 @@ _AGENT_ID = kind_of(int)
 
 def _take_turn(world: World, agent: Any) -> None:
     """Let the agent of this id act; None is the first one."""
-    there = numbers(world)
     try:
         number = 0 if agent is None else _AGENT_ID.convert(agent)
     except Unconvertible:
         number = -1
-    if number not in there:
-        which = "the only agent is 0" if len(there) == 1 else f"agents are 0 to {there[-1]}"
+    if number in world.others:
+        act_as(world, number)
+    elif number != world.acting:
+        last = len(world.others)
+        which = f"agents are 0 to {last}" if last else "the only agent is 0"
         raise WrongCall(
             f"agentId is {_shown(agent)}, and {which}; agentCount of Initialize sets how many "
             "there are.",
             INVALID_ARGUMENT,
         )
-    act_as(world, number)
 
 
 def quoted(value: object) -> str:

@@ -20,10 +20,11 @@ from er_gym.sim.space.footprints import RADIUS
 _COLOURS = ((0.16, 0.3, 0.85), (0.9, 0.8, 0.15), (0.2, 0.65, 0.25), (0.85, 0.2, 0.18))
 _DARK, _PALE = (0.12, 0.13, 0.15), (0.86, 0.85, 0.82)
 _TORSO = (
-    *((0.0, -HALF_HEIGHT), (0.75, -HALF_HEIGHT), (1.0, -0.75), (0.9, -0.1), (1.0, 0.35)),
+    *((0.0, -HALF_HEIGHT), (0.75, -HALF_HEIGHT), (0.95, -0.75), (0.85, -0.1), (0.92, 0.35)),
     *((0.6, 0.5), (0.3, 0.54), (0.0, 0.55)),
 )
-"""Shares of the radius, and metres from the agent's centre."""
+"""Shares of the radius, and metres from the agent's centre; nothing sticks out of the cylinder
+that hides things."""
 _SEGMENTS = 16
 _HEAD, _EYES = 0.71, 0.75
 """Height of the middle of the head, and of the band that shows where it looks, metres."""
@@ -38,7 +39,7 @@ def _node(number: int) -> Any:
     mesh.lathe(torso, shade * _COLOURS[number], segments=_SEGMENTS)
     mesh.ball((0.0, _HEAD, 0.0), (0.28, 0.36, 0.28), _PALE)
     mesh.box((0.0, _EYES, 0.1), (0.18, 0.07, 0.1), _DARK)
-    mesh.box((0.0, 0.2, RADIUS - 0.015), (0.16, 0.2, 0.03), _PALE)
+    mesh.box((0.0, 0.2, 0.17), (0.12, 0.2, 0.03), _PALE)
     return geometry(pieces_of(mesh.patches()), 0, f"agent {number}")
 
 

@@ -113,7 +113,7 @@ def _others_shown(world: World) -> tuple[Agent, ...]:
     others = [other for _, other in sorted(world.others.items())]
     if world.map_view or world.cameras:
         return tuple(other.agent for other in others)
-    camera, settings = world.agent.camera, world.settings
+    eye, settings = world.agent.eye, world.settings
     lens = (
         *(world.agent.rotation, world.agent.horizon, settings.field_of_view),
         settings.width / settings.height,
@@ -121,7 +121,7 @@ def _others_shown(world: World) -> tuple[Agent, ...]:
     return tuple(
         other.agent
         for other in others
-        if other.held >= 0 or in_sight(body_of(other.agent), camera, lens)
+        if other.held >= 0 or in_sight(body_of(other.agent), eye, lens)
     )
 
 

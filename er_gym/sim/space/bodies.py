@@ -7,7 +7,8 @@ of it.
 
 from __future__ import annotations
 
-from math import hypot
+from collections.abc import Sequence
+from math import cos, hypot, radians, sin, tan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,6 @@ from er_gym.sim.world import World
 
 HALF_HEIGHT = 0.9
 """Half the height of the body, metres."""
-_AROUND = hypot(RADIUS, HALF_HEIGHT)
-"""Radius of a ball around the body, metres."""
 _CLOSER = 1e-6
 """A step that brings two overlapping agents nearer by less does not, metres."""
 
@@ -69,17 +68,22 @@ def body_of(agent: Agent) -> Body:
     return x, y, z
 
 
-def in_sight(body: Body, camera: NDArray[np.float64], lens: Lens) -> bool:
-    """Whether a body may be in a camera's picture, which is (3,) metres in the world."""
-    yaw, pitch = np.radians(lens[0]), np.radians(lens[1])
-    x, y, z = (np.array(body) - camera).tolist()
-    right, ahead = x * np.cos(yaw) - z * np.sin(yaw), x * np.sin(yaw) + z * np.cos(yaw)
-    forward = ahead * np.cos(pitch) - y * np.sin(pitch)
-    up = ahead * np.sin(pitch) + y * np.cos(pitch)
-    half = np.tan(np.radians(lens[2]) / 2)
-    reach = np.array([half * lens[3], half])
-    beyond = np.abs([right, up]) - reach * forward  # how far outside, along the picture's axes
-    return bool(forward > -_AROUND and (beyond < _AROUND * np.hypot(1.0, reach)).all())
+def in_sight(body: Body, eye: Sequence[float], lens: Lens) -> bool:
+    """Whether a body may be in the picture of a camera at x, y and z, metres."""
+    yaw, pitch, tall = radians(lens[0]), radians(lens[1]), tan(radians(lens[2]) / 2)
+    x, y, z = body[0] - eye[0], body[1] - eye[1], body[2] - eye[2]
+    # In a frame that has turned with the camera, but has not tilted with it.
+    right, ahead = x * cos(yaw) - z * sin(yaw), x * sin(yaw) + z * cos(yaw)
+    rise, level, wide = sin(pitch), cos(pitch), tall * lens[3]
+    # Wholly beyond one of the planes that bound the picture; first the nearer one of the sides.
+    beyond = abs(right) - wide * (ahead * level - y * rise)
+    if beyond > RADIUS * hypot(1.0, wide * level) + HALF_HEIGHT * wide * abs(rise):
+        return False
+    for side in (1.0, -1.0):
+        up, on = tall * rise + side * level, side * rise - tall * level
+        if up * y + on * ahead > RADIUS * abs(on) + HALF_HEIGHT * abs(up):
+            return False
+    return True
 
 
 def hidden(

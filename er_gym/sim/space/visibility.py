@@ -8,6 +8,7 @@ other agent either (see :mod:`er_gym.sim.space.bodies`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -47,14 +48,16 @@ class Sight(NamedTuple):
 def visible(world: World, agent: Agent | None = None) -> NDArray[np.bool_]:
     """(N,) whether the acting agent sees each object, from its pose or from another one."""
     agent = agent or world.agent
-    known, settings, bodies = lines_of_sight(world), world.settings, hiding(world)
+    known, settings = lines_of_sight(world), world.settings
     lens = (
         agent.rotation,
         agent.horizon,
         settings.field_of_view,
         settings.width / settings.height,
     )
-    distance = settings.visibility_distance
+    distance, bodies = settings.visibility_distance, hiding(world)
+    if bodies:
+        bodies = _shown(bodies, agent.eye, lens)
     question = (*agent.position.tolist(), agent.standing, *lens, distance, *bodies)
     found = known.cached(
         question,
@@ -70,26 +73,29 @@ def visible(world: World, agent: Agent | None = None) -> NDArray[np.bool_]:
 
 def seen_by(world: World, sight: Sight) -> NDArray[np.bool_]:
     """(N,) whether a camera sees each object that is not in the acting agent's hand."""
+    sight = sight._replace(bodies=_shown(sight.bodies, sight.camera.tolist(), sight.lens))
     found = _look(lines_of_sight(world), sight).copy()
     if world.held_elsewhere:
         found |= _carried(world, sight)
     return found
 
 
+def _shown(bodies: tuple[Body, ...], eye: Sequence[float], lens: Lens) -> tuple[Body, ...]:
+    """Those of some bodies that may be in the picture: no others hide anything in it."""
+    return tuple(body for body in bodies if in_sight(body, eye, lens))
+
+
 def _look(known: LinesOfSight, sight: Sight) -> NDArray[np.bool_]:
     found = known.look(sight.camera, sight.lens)
     near = known.within_distance(sight.position, sight.distance)
     found = found if near is None else found & near
-    bodies = tuple(body for body in sight.bodies if in_sight(body, sight.camera, sight.lens))
-    return _not_behind(known, found, sight, bodies) if bodies else found
+    return _not_behind(known, found, sight) if sight.bodies else found
 
 
-def _not_behind(
-    known: LinesOfSight, found: NDArray[np.bool_], sight: Sight, bodies: tuple[Body, ...]
-) -> NDArray[np.bool_]:
+def _not_behind(known: LinesOfSight, found: NDArray[np.bool_], sight: Sight) -> NDArray[np.bool_]:
     """Those of some objects that are also seen past the bodies."""
     found, camera = found.copy(), sight.camera
-    behind = hidden(bodies, camera[None], known.points)[0]
+    behind = hidden(sight.bodies, camera[None], known.points)[0]
     for i in np.flatnonzero(found).tolist():
         first = known.first_point[i]
         own = slice(first, first + known.point_count[i])
