@@ -51,7 +51,7 @@ def together(agents: int, settings: dict[str, Any]) -> Step:
 def apart(agents: int, settings: dict[str, Any]) -> Step:
     """The steps of one agent in each of some controllers, which start where those together do."""
     first = EmbeddedController(scene=ROOM, agentCount=agents, **settings)
-    starts = [event.metadata["agent"] for event in first.last_event.events]
+    starts = [event.metadata["agent"] for event in first.step("Pass").events]
     first.stop()
     controllers = []
     for start in starts:
@@ -72,7 +72,7 @@ def measured(agents: int, steps: int, rounds: int) -> list[tuple[str, float, flo
         for _ in range(rounds):
             for step, into in zip(candidates, rates, strict=True):
                 into.append(rate(step, agents, steps))
-        found.append((name, *map(statistics.median, rates)))
+        found.append((name, statistics.median(rates[0]), statistics.median(rates[1])))
     return found
 
 
