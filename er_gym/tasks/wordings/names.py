@@ -99,6 +99,13 @@ def as_types(instruction: str) -> str:
     return _named().sub(lambda match: f"<{types_by_name()[match['type'].lower()]}>", instruction)
 
 
+def types_named_in(instruction: str) -> frozenset[str]:
+    """The object types that an instruction names, by whatever name, in English or Chinese."""
+    return frozenset(
+        types_by_name()[each["type"].lower()] for each in _named().finditer(instruction)
+    )
+
+
 def names_unseen(instruction: str) -> bool:
     """Whether an instruction calls a type by a name that is kept for evaluation."""
     held_out = _held_out()
