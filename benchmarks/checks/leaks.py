@@ -9,7 +9,9 @@ from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.rollout.judgement import judged_by_step
 from er_gym.rollout.records import EpisodeRecord
+from er_gym.tables import Table
 from er_gym.tasks.splits import UNSEEN_TYPES, subject_types, wording
+from er_gym.tasks.suites import own_tasks
 from er_gym.tasks.task import Task
 from er_gym.tasks.verbs import END
 
@@ -44,6 +46,20 @@ def shared(train: Sequence[Task], test: Sequence[Task]) -> dict[str, int]:
 def in_unseen_wording(train: Sequence[Task]) -> int:
     """How many training tasks are told in a wording that is kept for evaluation."""
     return sum(wording(task) == "unseen" for task in train)
+
+
+def leak_table(suites: Sequence[str]) -> Table:
+    """What the suites share with the training tasks."""
+    train = own_tasks("train")
+    found = {name: shared(train, own_tasks(name)) for name in suites}
+    rows = [(what, *(str(found[name][what]) for name in suites)) for what in found[suites[0]]]
+    held_back = str(in_unseen_wording(train))
+    return Table(
+        title=f"Tasks that share something with the {len(train):,} tasks of train",
+        head=("What", *(f"{name}, of {len(own_tasks(name)):,}" for name in suites)),
+        rows=(*rows, ("wording kept for evaluation", *[held_back] * len(suites))),
+        text_columns=1,
+    )
 
 
 def arrangement_of(task: Task) -> tuple[Any, ...] | None:

@@ -69,7 +69,11 @@ def test_the_page_has_a_row_for_each(episode) -> None:  # type: ignore[no-untype
         Played("mini", "oracle", "target", [score]),
         Played("er-1k", "takes-all", "explore", [score], ["t: why"], []),
     ]
-    text = page(played, 1, Table("Shared", ("What", "er-1k"), (("room", "7"),), 1))
+    naming = Table("Named", ("Suite", "Exactly"), (("mini", "131"),), 1)
+    leaks = Table("Shared", ("What", "er-1k"), (("room", "7"),), 1)
+    text = page(played, 1, naming, leaks, "The last chapter.\n")
+    assert "| mini | 131 |" in text
+    assert text.endswith("## What success depends on besides the task\n\nThe last chapter.\n")
     assert "| mini | 1 of 132 | 100.0 | 20.7 to 100.0 | - | 100.0 |" in text
     assert "| room | 7 |" in text
     assert "| er-1k | takes-all | explore | 1 | 1 | 0 |" in text
