@@ -12,6 +12,7 @@ import click
 import pytest
 
 from benchmarks.checks.doc_blocks.blocks import SHELL, Part, blocks, pages
+from benchmarks.cli.extras import extras
 from benchmarks.cli.main import cli
 from er_gym import __version__
 from er_gym.sim.actions import ACTIONS, perform
@@ -109,6 +110,21 @@ def test_files_and_modules_exist(repository: Path) -> None:
             pkgutil.resolve_name(name)
         except (ImportError, AttributeError) as error:
             raise AssertionError(f"{page}: {name}") from error
+
+
+def test_what_is_said_to_install_extras_works_in_a_checkout(repository: Path) -> None:
+    """An environment that a block makes lacks er-gym: it gets er-gym from the checkout."""
+    wanted = [
+        (part.page, name)
+        for part in blocks(repository)
+        for names in re.findall(r"pip install '(?:er-gym|\.)\[([\w,-]+)\]'", part.text)
+        for name in names.split(",")
+    ]
+    assert len(wanted) > 10
+    assert [each for each in wanted if each[1] not in extras()] == []
+    made = [part for part in blocks(repository) if "-m venv" in part.text and "[" in part.text]
+    assert len(made) > 5
+    assert [part.place for part in made if "er-gym[" in part.text] == []
 
 
 def test_the_citation_names_the_version(repository: Path) -> None:

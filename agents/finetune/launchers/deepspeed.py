@@ -46,9 +46,7 @@ def _write(plan: LaunchPlan, folder: Path) -> LauncherFiles:
         "--data": DATA if whole else f"{DATA}/train.jsonl",
         "--out": OUTPUT,
     }
-    notes = [
-        "This is er-gym's own trainer: `pip install 'er-gym[finetune]' deepspeed` on the cluster."
-    ]
+    notes = ["This is er-gym's own trainer: the cluster needs `er-gym[finetune]` and deepspeed."]
     if hub:
         notes.append(
             f"It loads a model from a directory: `hf download {plan.model.weights} --local-dir "

@@ -68,7 +68,7 @@ def _write(plan: LaunchPlan, folder: Path) -> LauncherFiles:
         environment={},
         notes=(
             f"`{_SCRIPT}` is TRL's `SFTTrainer` with a collator that gives loss to the turns "
-            "marked `train`; it needs er-gym beside TRL (`pip install er-gym trl peft datasets`).",
+            "marked `train`; it needs er-gym there, with `pip install trl peft datasets`.",
             "Nothing is cut off (`max_length: null`).",
         ),
         made_with="TRL 1.16.0 with transformers 5.23.0",
