@@ -32,8 +32,8 @@ from er_gym.tasks.wordings.instructions import instruction, reworded
 _SUITE = "er-1k"
 _SCRIPTED = ("searcher", "mask-reader", "zoo:all")
 _TEXT, _PICTURES = "zoo:er-tiny-text", "zoo:er-tiny-vl"
-_SEEN_TYPES = ("pickup_and_put", "single_pickup", "single_search", "single_toggle")
-"""Those that the model of pictures has learnt."""
+_LEARNT_FROM_PICTURES = ("pickup_and_put", "single_pickup", "single_search", "single_toggle")
+"""The types that the model of pictures has learnt."""
 _FAULTS = 0.1
 _FAR = "default, from afar"
 
@@ -129,16 +129,18 @@ def number_of_plays() -> int:
 
 def _plan(each: int, of_models: int) -> Iterator[tuple[str, Way, tuple[str, ...], int]]:
     """Agent, way, types and number of tasks of each."""
-    for agent in (*_SCRIPTED, _TEXT):
+    for agent in _SCRIPTED:
         for way in (USUAL, *CHANGES.values()):
-            yield agent, way, (), of_models if agent == _TEXT else each
+            yield agent, way, (), each
     for way in (USUAL, CHANGES["another start"]):
         yield "oracle", way, (), each
     for agent, faults, seeds in SEEDS:
         for seed in range(seeds):
             yield agent, _seeded(seed, faults), (), each
+    for way in (USUAL, *CHANGES.values()):
+        yield _TEXT, way, (), of_models
     for way in SIZES:  # of its few types twice as many tasks of each
-        yield _PICTURES, way, _SEEN_TYPES, 2 * of_models
+        yield _PICTURES, way, _LEARNT_FROM_PICTURES, 2 * of_models
 
 
 def chapter(found: Found) -> str:
