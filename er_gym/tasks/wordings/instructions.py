@@ -21,7 +21,7 @@ from er_gym.tasks.wordings.words import subject_words
 
 Language = Literal["en", "zh"]
 """A language of instructions."""
-LANGUAGES: tuple[str, ...] = get_args(Language)
+LANGUAGES: tuple[Language, ...] = get_args(Language)
 _GRAMMARS: Mapping[str, Grammar] = {"en": ENGLISH, "zh": chinese.CHINESE}
 _CHINESE = re.compile(r"[\u4e00-\u9fff]")
 _ROOM = re.compile("|".join((*ROOM_KINDS, rf"\b{HOUSE}\b", *chinese.ROOMS.values())))
