@@ -115,7 +115,8 @@ def plays(
     PROTOCOLS.setdefault(_FAR, replace(DEFAULT, name=_FAR, start=from_afar))
     for agent, way, types, number in _plan(each, of_models):
         tasks = sample_of_types(own_tasks(_SUITE), types, number)
-        env = {"instances": "explore", **way.env}
+        # The oracle means the task's own objects, so elsewhere it fails from any start.
+        env = {"instances": "target" if agent == "oracle" else "explore", **way.env}
         yield (agent, way.name), played(
             work, way.name, agent, [way.told(task) for task in tasks],
             env=env, seed=way.seed, settings=way.settings,
@@ -226,11 +227,11 @@ tasks. *Gained* and *lost* are the tasks that came out otherwise; where there ar
 says nothing, and at most three in n would come out otherwise, at 95 %.
 
 *Another start* is where one can stand furthest from the usual one, looking the other way; the
-oracle shows what can be done from there. `searcher`, `mask-reader` and `zoo:all` read words and
-lists, so the size of pictures is nothing to them. `zoo:er-tiny-vl` has learnt four types of tasks
-from pictures of 448 × 252 pixels; it scales what it is shown to 66,000 pixels at most, so the
-largest pictures are only sharper to it. No language model here has learnt from instructions in
-Chinese.
+oracle, with `instances="target"`, shows what can be done from there. `searcher`, `mask-reader` and
+`zoo:all` read words and lists, so the size of pictures is nothing to them. `zoo:er-tiny-vl` has
+learnt four types of tasks from pictures of 448 × 252 pixels; it scales what it is shown to 66,000
+pixels at most, so the largest pictures are only sharper to it. No language model here has learnt
+from instructions in Chinese.
 """
 _SEEDED = """\
 The seed draws the faults, and what an agent draws that draws at all. `searcher`, `mask-reader` and
