@@ -17,7 +17,6 @@ from agents.factory import AgentFactory, comparable_settings, is_model_agent, lo
 from agents.vlm.clients.registry import settings_file
 from agents.vlm.prompts import prompts_for
 from agents.zoo.index import CARD, PREFIX, files_of, find_model
-from benchmarks.vlm_run import env_of
 from er_gym import __version__
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.agent import Agent
@@ -118,7 +117,7 @@ def _maker(
     told = comparable_settings(settings, prompts_for(settings).digest)
     factory = AgentFactory(agent, settings)
     try:
-        yield factory.agent, env_of(settings), {**told, **weights}
+        yield factory.agent, settings.env, {**told, **weights}
     finally:
         factory.close()
 
