@@ -20,7 +20,6 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode, urljoin
@@ -31,6 +30,7 @@ from PIL import Image
 from benchmarks.harness.processes import ER_GYM
 from benchmarks.monitor.directories import Directories, Directory, Kind
 from er_gym.data.collection import Collection
+from er_gym.data.pictures import open_picture
 from er_gym.rollout.run_directory import RunDirectory
 
 WIDTHS = (1440, 900, 360)
@@ -251,7 +251,7 @@ def main(
 
 def _small(picture: bytes, file: Path) -> None:
     """Keep a picture in 256 colours."""
-    image = Image.open(BytesIO(picture)).convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    image = open_picture(picture).quantize(256, dither=Image.Dither.NONE)
     image.save(file, optimize=True)
 
 

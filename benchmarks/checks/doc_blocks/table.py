@@ -192,6 +192,8 @@ SLOW: Mapping[str, tuple[str, ...]] = {
         "docs/tasks.md: er-gym tasks generate",
         "docs/zoo.md: er-gym bench",
         "er_gym/tasks/data/er-1k.md: er-gym tasks generate",
+        "er_gym/tasks/data/er-val.md: er-gym tasks generate",
+        "er_gym/tasks/data/houses-1k.md: er-gym tasks generate",
         "er_gym/tasks/data/mini.md: er-gym tasks generate",
     ),
     "takes more than a few seconds": (

@@ -68,6 +68,8 @@ def test_the_learner_is_shown_what_the_agent_saw(family: str, tmp_path: Path) ->
         files.image_processor, files.config.image_token_id, how.pictures.model_bounds, 0, 32
     )
     given = ReinforceSettings.model_validate({"training": {"learning_rate": 1e-12}})
+    # Another test in this process may have left its own, with another precision.
+    accelerate.state.AcceleratorState._reset_state()
     learner = Learner(network, None, given, accelerate.Accelerator(cpu=True), collator)
 
     def gap(rows: Sequence[Row]) -> float:
