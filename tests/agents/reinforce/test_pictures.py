@@ -11,13 +11,14 @@ from typing import Any
 import accelerate
 import pytest
 import safetensors.torch
+from bandit_runs import bandit_settings, curve
 from local_clients import EYES, picture, settings, user
 from tiny_qwen import make_tiny_qwen
 
 from agents.finetune.batches import Collator
 from agents.finetune.model_files import open_model
 from agents.finetune.network import load_network
-from agents.finetune.run_files import RunFiles, lines_of
+from agents.finetune.run_files import lines_of
 from agents.finetune.settings import ModelSettings
 from agents.reinforce import train as training
 from agents.reinforce.checks import validation_tasks
@@ -33,7 +34,12 @@ from er_gym.tasks.config_folder import config_directory
 from er_gym.tasks.reading import read_yaml
 from er_gym.tasks.suites import Suite
 
-TIMES = ("seconds", "seconds_playing", "seconds_learning", "memory")
+SEEING = {
+    "curriculum": {"types": ["SingleToggle"]},
+    "model": {"freeze": ["vision"]},
+    "play": {"group": 3},
+    "training": {"updates": 3},
+}
 
 
 def conversation(path: Path) -> list[Turn]:
@@ -88,22 +94,7 @@ def test_the_learner_is_shown_what_the_agent_saw(family: str, tmp_path: Path) ->
 
 
 def run_settings(**more: Any) -> ReinforceSettings:
-    told: dict[str, Any] = {
-        "rewards": {"bandit:even_letters": 1.0},
-        "curriculum": {"types": ["SingleToggle"]},
-        "model": {"dtype": "float32", "freeze": ["vision"]},
-        "play": {"tasks": 1, "group": 3, "concurrency": 1},
-        "advantage": {"row": "gigpo", "discount": 0.0},
-        "training": {"updates": 3, "learning_rate": 0.03, "save_every": 2},
-    }
-    for name, values in more.items():
-        told[name] = {**told.get(name, {}), **values}
-    return ReinforceSettings.model_validate(told)
-
-
-def curve(run: Path) -> list[dict[str, Any]]:
-    lines = RunFiles(run).metrics()
-    return [{key: line[key] for key in line if key not in TIMES} for line in lines]
+    return bandit_settings(SEEING, more)
 
 
 def test_a_model_that_sees_learns_and_goes_on_after_an_interruption(

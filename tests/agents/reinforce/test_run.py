@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from bandit_runs import bandit_settings, curve
 from click.testing import CliRunner
 from forked import SPAWNED
 
@@ -23,26 +24,14 @@ from er_gym.resumable import FolderConflict
 from er_gym.rollout import processes
 from er_gym.tasks.suites import Suite, load_suite
 
-TIMES = ("seconds", "seconds_playing", "seconds_learning", "memory")
+MANY = {
+    "play": {"group": 12},
+    "training": {"updates": 5, "batch": 16},
+}
 
 
 def settings(**more: Any) -> ReinforceSettings:
-    """One conversation at a time: then the same numbers are added in the same order."""
-    told: dict[str, Any] = {
-        "rewards": {"bandit:even_letters": 1.0},
-        "model": {"dtype": "float32"},
-        "play": {"tasks": 1, "group": 12, "concurrency": 1},
-        "advantage": {"row": "gigpo", "discount": 0.0},
-        "training": {"updates": 5, "learning_rate": 0.03, "save_every": 2, "batch": 16},
-    }
-    for name, values in more.items():
-        told[name] = {**told.get(name, {}), **values}
-    return ReinforceSettings.model_validate(told)
-
-
-def curve(run: Path) -> list[dict[str, Any]]:
-    lines = RunFiles(run).metrics()
-    return [{key: line[key] for key in line if key not in TIMES} for line in lines]
+    return bandit_settings(MANY, more)
 
 
 @pytest.fixture(scope="module")
