@@ -51,6 +51,8 @@ from er_gym.rollout.causes import CONTEXT, REQUEST
 
 _THINK, _THOUGHT = "<think>", "</think>"
 _SHORT = 32  # tokens
+_LIBRARIES_OF_CUDA = ("mha_graph.execute", "CUDNN_STATUS", "CUBLAS_STATUS")
+_ENOUGH_FOR_LIBRARIES = 1 << 30  # bytes of a GPU
 
 
 @dataclass(frozen=True)
@@ -469,7 +471,7 @@ def _without_thought(text: str, thinking: bool) -> tuple[str, str]:
 
 def _explained(error: RuntimeError, rows: Sequence[EncodedPrompt]) -> Exception:
     """Torch's error as the exception that the batcher expects."""
-    if isinstance(error, torch.cuda.OutOfMemoryError) or "DefaultCPUAllocator" in str(error):
+    if _says_memory_is_short(error):
         tokens = max(len(row.ids) for row in rows)
         return MemoryError(
             f"{len(rows)} conversations of up to {tokens} tokens do not fit into memory; lower "
@@ -480,3 +482,11 @@ def _explained(error: RuntimeError, rows: Sequence[EncodedPrompt]) -> Exception:
             f"the device failed, and this process cannot use it again: {error_summary(error)}"
         )
     return error
+
+
+def _says_memory_is_short(error: RuntimeError) -> bool:
+    if isinstance(error, torch.cuda.OutOfMemoryError) or "DefaultCPUAllocator" in str(error):
+        return True
+    # Libraries that find no memory for their workspace fail in words of their own.
+    unsaid = any(name in str(error) for name in _LIBRARIES_OF_CUDA)
+    return unsaid and torch.cuda.mem_get_info()[0] < _ENOUGH_FOR_LIBRARIES

@@ -89,6 +89,30 @@ def test_what_does_not_fit_into_memory_is_halved(client: Clients, reuse: bool) -
     assert same(replies, [alone.reply(talk, 0) for talk in talks])
 
 
+@pytest.mark.parametrize(("free", "halves"), [(100 << 20, True), (8 << 30, False)])
+def test_a_library_that_finds_no_memory_on_the_gpu_is_believed(
+    client: Clients, monkeypatch: pytest.MonkeyPatch, free: int, halves: bool
+) -> None:
+    # The words are those of an H100 that several processes had filled.
+    monkeypatch.setattr(torch.cuda, "mem_get_info", lambda device=None: (free, 80 << 30))
+    model = client(local={"batch": 4, "wait": LONG})
+    sizes: list[int] = []
+
+    def cramped(count: int) -> None:
+        sizes.append(count)
+        if count > 2 and sizes[:-1].count(count) == 0:
+            raise RuntimeError(
+                "Expected mha_graph.execute(handle, variant_pack, workspace_ptr.get()).is_good() "
+                "to be true, but got false."
+            )
+
+    watched(model, cramped)
+    at_once(model, conversations("qwen2_5_vl"))
+    [failed] = [place for place, count in enumerate(sizes) if count > 2][:1]
+    # Where memory is not short the batch is faulty, and its jobs begin anew one by one.
+    assert sizes[failed + 1] == (sizes[failed] // 2 if halves else 1)
+
+
 @BOTH_WAYS
 def test_a_device_that_fails_ends_the_run(client: Clients, reuse: bool) -> None:
     if not hasattr(torch, "AcceleratorError"):
