@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -12,11 +13,42 @@ from benchmarks.scoring.drawing import draw, write_charts
 from benchmarks.scoring.series import Axis, Chart, Point, Series
 
 _POINTS = 200
-_OVER = {"steps": (1e-3, "thousand steps"), "seconds": (1 / 60, "minutes")}
-_PANELS = {
-    "rollout/success_rate": "while it trains, training rooms",
-    "eval/success_rate": "held out, unseen rooms",
-}
+
+
+@dataclass(frozen=True)
+class Curves:
+    """What is drawn of a kind of runs.
+
+    Attributes:
+        name: with which the pictures' names begin.
+        over: the values on the horizontal axes, one picture each: by what they are multiplied
+            there, and the label.
+        panels: the successes, one panel each, with its title.
+    """
+
+    name: str
+    over: Mapping[str, tuple[float, str]]
+    panels: Mapping[str, str]
+
+
+POLICIES = Curves(
+    "learning",
+    {"steps": (1e-3, "thousand steps"), "seconds": (1 / 60, "minutes")},
+    {
+        "rollout/success_rate": "while it trains, training rooms",
+        "eval/success_rate": "held out, unseen rooms",
+    },
+)
+"""Of ``er-gym train-rl``."""
+REINFORCED = Curves(
+    "reinforcement",
+    {"episodes": (1e-3, "thousand episodes"), "seconds": (1 / 60, "minutes")},
+    {
+        "success": "episodes that it learns from",
+        "validation/success": "validation, the likeliest tokens",
+    },
+)
+"""Of ``er-gym reinforce``."""
 
 
 class HasCurve(Protocol):
@@ -24,14 +56,18 @@ class HasCurve(Protocol):
 
     @property
     def curve(self) -> list[dict[str, float]]:
-        """Lines with ``steps`` and the logged values."""
+        """Lines with what is drawn, and the values over which it is."""
 
 
 def draw_curves(
-    families: Mapping[str, Sequence[HasCurve]], out: Path, *, force: bool = True
+    families: Mapping[str, Sequence[HasCurve]],
+    out: Path,
+    kind: Curves = POLICIES,
+    *,
+    force: bool = True,
 ) -> list[Path]:
-    """Draw success over steps and over minutes. Each family has a line: mean, minimum and maximum
-    of its seeds.
+    """Draw success over steps or episodes, and over minutes. Each family has a line: mean, minimum
+    and maximum of its seeds.
 
     Returns:
         The files.
@@ -41,7 +77,7 @@ def draw_curves(
         ForeignFile, CannotWrite: see :func:`~er_gym.writing.write_output`.
     """
     figures = {}
-    for over, (scale, label) in _OVER.items():
+    for over, (scale, label) in kind.over.items():
         panels = [
             Chart(
                 title,
@@ -49,9 +85,9 @@ def draw_curves(
                 Axis("success, %", 0.0, 100.0),
                 [Series(name, _mean(runs, key, over, scale)) for name, runs in families.items()],
             )
-            for key, title in _PANELS.items()
+            for key, title in kind.panels.items()
         ]
-        figures[f"learning_{over}"] = draw(*panels, width=11, height=4.2)
+        figures[f"{kind.name}_{over}"] = draw(*panels, width=11, height=4.2)
     return write_charts(out, figures, force=force)
 
 

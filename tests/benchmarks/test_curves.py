@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from benchmarks.scoring.curves import draw_curves
+from benchmarks.scoring.curves import REINFORCED, draw_curves
 
 
 @dataclass
@@ -35,3 +35,13 @@ def test_a_picture_over_steps_and_one_over_minutes(tmp_path: Path) -> None:
     for file in files:
         colors = {color for _, color in Image.open(file).convert("RGB").getcolors(10**6)}
         assert {(0x24, 0x70, 0xAD), (0xB5, 0x76, 0x2A)} <= colors
+
+
+def test_runs_of_reinforcement_have_axes_of_their_own(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="needs the extra charts")
+    run = Run([{"episodes": 100.0 * n, "seconds": 60.0 * n, "success": n / 4} for n in range(4)])
+    files = draw_curves({"rloo": [run]}, tmp_path, REINFORCED)
+    assert [file.name for file in files] == [
+        "reinforcement_episodes.png",
+        "reinforcement_seconds.png",
+    ]

@@ -144,6 +144,7 @@ NEVER: Mapping[str, tuple[str, ...]] = {
         "docs/models.md: er-gym",
         "docs/reinforcement.md: er-gym",
         "docs/reinforcement.md: OMP_NUM_THREADS",
+        "docs/reinforcement.md: python -m benchmarks.pages.reinforcement",
         "docs/zoo.md: er-gym train-rl",
         "er_gym/tasks/data/train.md: er-gym tasks generate",
     ),
