@@ -18,8 +18,9 @@ def with_values(
     played: Sequence[tuple[Job, Episode, Player]],
     settings: ReinforceSettings,
     seed: Callable[[str], int],
-) -> list[Episode]:
-    """Episodes with what was earned on average from their states on.
+) -> tuple[list[Episode], int]:
+    """Episodes with what was earned on average from their states on, and how often they were
+    continued.
 
     The state before every ``advantage.branch_every``-th turn is taken up in an environment, with
     the conversation that led to it, and ``advantage.branches`` episodes go on from there.
@@ -58,4 +59,4 @@ def with_values(
             for turn in range(len(episode.turns))
         ]
         found.append(replace(episode, values=tuple(values)))
-    return found
+    return found, len(jobs)

@@ -73,6 +73,7 @@ class State(BaseModel):
         update: how many are done.
         success: the model's by type of task, a fraction.
         episodes, tokens: how many have been played, and learnt from.
+        continued: how often episodes were continued from one of their states.
         seconds: that it has taken.
         best: the greatest success in validation, a fraction; None before the first.
         best_update: after which update that was.
@@ -83,6 +84,7 @@ class State(BaseModel):
     update: int = 0
     success: dict[str, float] = {}
     episodes: int = 0
+    continued: int = 0
     tokens: int = 0
     seconds: float = 0.0
     best: float | None = None

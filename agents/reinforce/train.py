@@ -318,9 +318,9 @@ def _reinforce(
 
         jobs = group_jobs(tasks[process::processes], settings.play.group, seed)
         played = samplers["play"].play(jobs, forks=row.values)
-        episodes = [episode for _, episode, _ in played]
+        episodes, continued = [episode for _, episode, _ in played], 0
         if row.values:
-            episodes = with_values(samplers["play"], played, settings, seed)
+            episodes, continued = with_values(samplers["play"], played, settings, seed)
         at_learning = time.monotonic()
         for sampler in samplers.values():
             sampler.client.forget()  # it is of no more use, and learning needs memory
@@ -334,6 +334,7 @@ def _reinforce(
         # what all processes have seen
         lines = gather_object(lines)
         skipped = gather_object(skipped)
+        continued = sum(gather_object([continued]))
         seconds = time.monotonic() - began
         state = state.model_copy(
             update={
@@ -344,6 +345,7 @@ def _reinforce(
                     settings.curriculum.memory,
                 ),
                 "episodes": state.episodes + len(lines),
+                "continued": state.continued + continued,
                 "tokens": state.tokens + int(figures.get("learnt_tokens", 0)),
                 "seconds": state.seconds + seconds,
             }
@@ -355,6 +357,7 @@ def _reinforce(
             **figures,
             **{f"success/{name}": value for name, value in sorted(state.success.items())},
             "episodes": state.episodes,
+            "continued": state.continued,
             "seconds": round(state.seconds, 1),
             "seconds_playing": round(at_learning - began, 2),
             "seconds_learning": round(time.monotonic() - at_learning, 2),

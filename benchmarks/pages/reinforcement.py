@@ -26,7 +26,7 @@ from benchmarks.scoring.curves import REINFORCED, draw_curves
 from er_gym.tables import Table
 
 VALIDATION = "validation/success"
-_START = {"episodes": 0, "seconds": 0.0}
+_START = {"episodes": 0, "continued": 0, "seconds": 0.0}
 _SUCCESSES = ("validation first", "last", "best", "while it learns")
 _LAST = 10
 """The updates over which success while it learns is averaged."""
@@ -60,8 +60,10 @@ class ReinforcedRun:
 
     @cached_property
     def curve(self) -> list[dict[str, float]]:
-        """The figures of each update; validation before the first is at no episodes."""
-        return [_START | line for line in RunFiles(self.path).metrics()]
+        """The figures of each update; validation before the first is at no episodes. To continue
+        an episode counts as one."""
+        lines = [_START | line for line in RunFiles(self.path).metrics()]
+        return [line | {"episodes": line["episodes"] + line["continued"]} for line in lines]
 
     @property
     def updates(self) -> int:
