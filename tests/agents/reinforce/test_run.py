@@ -122,6 +122,7 @@ def test_each_way_of_learning_runs(
     [*_, line] = curve(result.path)
     assert line["kl"] >= 0
     assert line["gradient_norm"] > 0
+    assert (line["continued"] > 0) == (more["advantage"]["row"] == "branches")
     assert (result.path / "model").is_dir()
     assert len(result.validation) == (2 if "validation" in more else 0)
 
