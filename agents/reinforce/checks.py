@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Iterable
 
 from agents import configs
 from agents.finetune.model_files import ModelFiles
@@ -70,13 +71,28 @@ def greedy(agent: AgentSettings) -> AgentSettings:
 
 
 def check_suite(suite: Suite, settings: ReinforceSettings) -> None:
-    """Raise ValueError if models are measured by the suite's tasks or in its rooms."""
+    """Raise ValueError if models are measured by the suite's tasks, or in its rooms or their
+    arrangements."""
     kept = rooms_kept_for_evaluation(suite.tasks)
     if kept or suite.name == settings.validation.suite:
         why = f"plays in rooms that are kept for evaluation, such as {kept[0]}" if kept else (
             "is the one that validation chooses by"
         )  # fmt: skip
         raise ValueError(f"the suite {suite.name} {why}; learn from --suite train")
+    if settings.validation.tasks:
+        shown = _layouts(load_suite(settings.validation.suite).tasks) & _layouts(suite.tasks)
+        if shown:
+            scene, layout = min(shown)
+            raise ValueError(
+                f"{len(shown)} arrangements of rooms, such as {layout} of {scene}, are also in "
+                f"{settings.validation.suite}, by which validation chooses; make the tasks with "
+                "another seed"
+            )
+
+
+def _layouts(tasks: Iterable[Task]) -> set[tuple[str, str]]:
+    """The rearranged rooms: scene and arrangement."""
+    return {(t.scene, t.arrangement.layout) for t in tasks if t.arrangement.layout}
 
 
 def tasks_of_types(suite: Suite, settings: ReinforceSettings) -> tuple[Task, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -149,6 +150,9 @@ def test_what_does_not_go_together_is_refused(model: Path, suite: Suite, tmp_pat
 
     refused("play.group=8", settings(play={"group": 1}))
     refused("kept for evaluation", settings(), load_suite("mini"))
+    validated = settings(validation={"suite": "er-val", "tasks": 1})
+    same = [t for t in load_suite("er-val").tasks if t.arrangement.layout][:1]
+    refused("1 arrangements .* also in er-val", validated, replace(suite, tasks=tuple(same)))
     refused("unknown|no advantage", settings(advantage={"row": "best"}))
     with pytest.raises(ValueError, match=r"lora\.dropout"):
         settings(model={"lora": {"dropout": 0.1}})
