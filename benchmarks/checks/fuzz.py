@@ -4,12 +4,12 @@
     python -m benchmarks.checks.fuzz --actions 100000 --seed 0 --run 17    # one run, step by step
     python -m benchmarks.checks.fuzz --actions 10000 --agents 4            # up to four in a room
 
-The actions are split into runs of 200 in a scene each. A run depends only on its number and the
-seed, so the same seed plays the same actions with any number of workers. The ``fingerprint`` at the
-end is a digest of all requests and answers; equal ones prove it. One run in ten uses the official
-client's interface, the others use the engine directly. :mod:`benchmarks.checks.fuzz_checks` checks
-the state after each action. Each problem is printed with the command that repeats it, and makes the
-exit code 1.
+The actions are split into runs of 200 in a scene each; one in four begins in a generated house. A
+run depends only on its number and the seed, so the same seed plays the same actions with any number
+of workers. The ``fingerprint`` at the end is a digest of all requests and answers; equal ones prove
+it. One run in ten uses the official client's interface, the others use the engine directly.
+:mod:`benchmarks.checks.fuzz_checks` checks the state after each action. Each problem is printed
+with the command that repeats it, and makes the exit code 1.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ import click
 
 from benchmarks.checks.fuzz_checks import CompanyChecker, Pictures, floor, scene_of
 from benchmarks.checks.fuzz_report import FuzzPlan, FuzzReport, FuzzStep, show
-from benchmarks.checks.fuzz_requests import Request, Room, draw_request
+from benchmarks.checks.fuzz_requests import Request, Room, draw_house, draw_request
 from benchmarks.checks.scene_jobs import play_options, run_scene_jobs, with_bar
 from benchmarks.terminal import echo
 from er_gym.sim.controller import EmbeddedController
@@ -41,6 +41,8 @@ from er_gym.sim.world import World
 _THROUGH_THE_CLIENT = 10
 """One run in this many uses the official client's interface."""
 _WIDTH, _HEIGHT = 32, 24
+_HOUSES = 0.25
+"""The share of runs that begin in a generated house."""
 _INTERRUPTED = 130
 
 
@@ -68,7 +70,7 @@ class EngineDriver:
     def step(self, request: Request) -> Outcome:
         """Do an action."""
         outcome = _outcome(*self._engine.step(request))
-        outcome.others = [_outcome(*each) for each in self._engine.bystanders]
+        outcome.others = [_outcome(each.metadata, each.view) for each in self._engine.bystanders]
         return outcome
 
 
@@ -168,6 +170,9 @@ def play(plan: FuzzPlan, run: int) -> Iterator[FuzzStep]:
                     if plan.agents > 1:
                         count = 1 + random.randrange(plan.agents)
                         problems += game.do({"action": "Initialize", "agentCount": count})
+                    if random.random() < _HOUSES:
+                        house = draw_house(game.room(random, plan.scenes))
+                        problems += game.do({"action": "CreateHouse", "house": house})
                 scene = scene_of(game.metadata)
                 request = draw_request(game.room(random, plan.scenes))
                 problems += game.do(request)

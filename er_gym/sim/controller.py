@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, ClassVar
 
 from numpy.typing import NDArray
 
+from er_gym.sim.bystander import Bystander
 from er_gym.sim.client_import import import_client
 from er_gym.sim.copy_on_read import CopyOnReadDict
 from er_gym.sim.direct import Direct
@@ -33,6 +35,10 @@ _TAKEN = frozenset(
 
 _ROBOTHOR = "FloorPlan_"
 """What the names of RoboTHOR's scenes begin with."""
+_WITHOUT_PICTURES = frozenset(
+    {"metadata", "screen_width", "screen_height", "color_to_object_id", "object_id_to_color"}
+)
+"""The attributes of an official event that are no pictures and nothing made of pictures."""
 _READ_BY_EVENT = ("screenWidth", "screenHeight", "colors")
 _RENAMED = {
     "renderClassImage": "renderSemanticSegmentation",
@@ -78,6 +84,40 @@ class EmbeddedEvent(ai2thor.server.Event):  # type: ignore[misc]  # untyped
         pass
 
 
+class BystanderEvent(EmbeddedEvent):
+    """The event of an agent that did not act, whose pictures are drawn when they are first read."""
+
+    def __init__(self, bystander: Bystander, attach: Callable[[EmbeddedEvent, View], None]) -> None:
+        super().__init__(bystander.metadata)
+        own = self.__dict__
+        without = {name: own.pop(name) for name in own.keys() - _WITHOUT_PICTURES}
+        self._later: tuple[Bystander, Any, dict[str, Any]] | None = (bystander, attach, without)
+
+    def __getattr__(self, name: str) -> Any:
+        # Python asks this only for what is not there yet.
+        later = self.__dict__.get("_later")
+        if later is None or name not in later[2]:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        self._show()
+        return self.__dict__[name]
+
+    def __getstate__(self) -> dict[str, Any]:
+        self._show()
+        return self.__dict__
+
+    def _show(self) -> None:
+        """Draw the pictures; what a program has put in their place stays."""
+        if self._later is None:
+            return
+        (bystander, attach, without), self._later = self._later, None
+        put = dict(self.__dict__)
+        self.__dict__.update(without)
+        view = bystander.view
+        assert view is not None  # otherwise the event is a plain one
+        attach(self, view)
+        self.__dict__.update(put)
+
+
 class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is untyped
     """Replaces the client's pipe to Unity: ``send`` acts, ``receive`` returns the event."""
 
@@ -108,7 +148,7 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
         event = self._event_of(metadata, frames)
         others = self.engine.bystanders
         if others:
-            events, active = [self._event_of(*each) for each in others], metadata["agentId"]
+            events, active = [self._event_beside(each) for each in others], metadata["agentId"]
             events.insert(active, event)
             event = ai2thor.server.MultiAgentEvent(active, events)
         self._event = event
@@ -116,36 +156,49 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
     def _event_of(self, metadata: LazyMetadata, frames: View | None) -> EmbeddedEvent:
         event = EmbeddedEvent(metadata)
         if frames is not None:
-            self._attach(event, frames)
+            self._reader()(event, frames)
         return event
 
-    def receive(self, timeout: float | None = None) -> ai2thor.server.Event:
-        """The event of the action last sent."""
-        event, self._event = self._event, None
-        return event
+    def _event_beside(self, bystander: Bystander) -> EmbeddedEvent:
+        """The event of an agent that did not act."""
+        if bystander.undrawn and not self.add_depth_noise:  # whose chance goes by the order
+            return BystanderEvent(bystander, self._reader())
+        return self._event_of(bystander.metadata, bystander.view)
 
-    def _attach(self, event: ai2thor.server.Event, view: View) -> None:
-        """Add the images to an event, in the form in which the client reads them off the wire."""
+    def _reader(self) -> Callable[[EmbeddedEvent, View], None]:
+        """Adds the images to an event, with the depth of the present settings."""
         depth = {
             "depth_format": self.depth_format,
             "camera_near_plane": self.camera_near_plane,
             "camera_far_plane": self.camera_far_plane,
         }
         noise = {"add_noise": self.add_depth_noise, "noise_indices": self.noise_indices}
-        event.frame = view.rgb.copy()  # later events share the view
-        if view.depth is not None:
-            event.add_image_depth(_upside_down(view.depth), **depth, **noise)
-        if view.instances is not None:
-            event.add_image_ids(_upside_down(rgba(view.instances)))
-        event.semantic_segmentation_frame = view.classes
-        for other in view.third_party:
-            event.third_party_camera_frames.append(other.rgb)
-            if other.depth is not None:
-                event.add_third_party_image_depth(_upside_down(other.depth), **depth)
-            if other.instances is not None:
-                event.add_third_party_image_ids(_upside_down(rgba(other.instances)))
-            if other.classes is not None:
-                event.third_party_semantic_segmentation_frames.append(other.classes)
+        return partial(_attach, depth=depth, noise=noise)
+
+    def receive(self, timeout: float | None = None) -> ai2thor.server.Event:
+        """The event of the action last sent."""
+        event, self._event = self._event, None
+        return event
+
+
+def _attach(
+    event: ai2thor.server.Event, view: View, depth: dict[str, Any], noise: dict[str, Any]
+) -> None:
+    """Add the images to an event, in the form in which the client reads them off the wire."""
+    event.frame = view.rgb.copy()  # later events share the view
+    if view.depth is not None:
+        event.add_image_depth(_upside_down(view.depth), **depth, **noise)
+    if view.instances is not None:
+        event.add_image_ids(_upside_down(rgba(view.instances)))
+    event.semantic_segmentation_frame = view.classes
+    for other in view.third_party:
+        event.third_party_camera_frames.append(other.rgb)
+        if other.depth is not None:
+            event.add_third_party_image_depth(_upside_down(other.depth), **depth)
+        if other.instances is not None:
+            event.add_third_party_image_ids(_upside_down(rgba(other.instances)))
+        if other.classes is not None:
+            event.third_party_semantic_segmentation_frames.append(other.classes)
 
 
 def _upside_down(picture: NDArray[Any]) -> bytes:

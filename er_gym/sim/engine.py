@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from weakref import ReferenceType, ref
 
 from er_gym.sim.actions import perform
+from er_gym.sim.bystander import Bystander
 from er_gym.sim.crew import as_agent, copy_of
 from er_gym.sim.errors import ActionFailed, WrongCall
 from er_gym.sim.house.build import EMPTY, house_scene
@@ -43,13 +44,6 @@ class Answer(NamedTuple):
     reply: Any = None
 
 
-class Bystander(NamedTuple):
-    """What an agent that did not act is told, and what it sees; see :meth:`Engine.step`."""
-
-    metadata: LazyMetadata
-    view: View | None
-
-
 def _answer(act: Callable[[], Any]) -> Answer:
     try:
         return Answer(reply=act())
@@ -83,7 +77,7 @@ class Engine:
         if light not in LIGHTS:
             raise ValueError(f"unknown light {light!r}; choose one of: {', '.join(LIGHTS)}")
         self._kind = metadata_kind
-        self._last: tuple[ReferenceType[LazyMetadata], ...] = ()
+        self._last: tuple[ReferenceType[LazyMetadata | Bystander], ...] = ()
         # What each agent of several did last, and with which answer.
         self._did: dict[int, tuple[str, Answer]] = {}
         self.bystanders: tuple[Bystander, ...] = ()
@@ -118,8 +112,10 @@ class Engine:
         frames = draw(now) if request.get("renderImage", True) else None
         if several:
             self.bystanders = self._watching(name, answer, frames)
-            told = (report, *(each.metadata for each in self.bystanders))
-            self._last = (*(each for each in self._last if each() is not None), *map(ref, told))
+            unread: list[LazyMetadata | Bystander] = [report]
+            unread += (each.metadata for each in self.bystanders)
+            unread += (each for each in self.bystanders if each.undrawn)
+            self._last = (*(each for each in self._last if each() is not None), *map(ref, unread))
         else:
             self._last = (ref(report),)
         self.world.settings = settings
@@ -127,7 +123,8 @@ class Engine:
 
     def _keeps_objects(self, name: str, request: Mapping[str, Any]) -> bool:
         """Whether an action of one of several agents leaves all objects as they are. Then what was
-        told before can be computed later: it is of a copy of the world, which has its own poses."""
+        told before can be computed later: it is of a copy of the world, which has its own poses.
+        """
         world, agent = self.world, request.get("agentId")
         if not world.others or name not in _WALKS or len(self._last) > _MOST_UNSETTLED:
             return False
@@ -146,8 +143,8 @@ class Engine:
         for number in sorted(self.world.others):
             own = as_agent(self.world, number)
             did, told = self._did.setdefault(number, (name, answer))
-            seen = None if frames is None else draw(own, frames.third_party)
-            found.append(Bystander(metadata(own, did, *told, self._kind), seen))
+            cameras = None if frames is None else frames.third_party
+            found.append(Bystander(metadata(own, did, *told, self._kind), own, cameras))
         return tuple(found)
 
     def do(self, act: Callable[[World], Any]) -> Answer:
@@ -157,7 +154,7 @@ class Engine:
         return _answer(lambda: act(self.world))
 
     def _settle(self) -> None:
-        """Compute what readers may still want to know of the state before an action."""
+        """Compute and draw what readers may still want to know of the state before an action."""
         for each in self._last:
             last = each()
             if last is not None:

@@ -70,7 +70,9 @@ class PlayerProcess:
             request = {**request, "renderImage": False}  # the client drops this event
         metadata, view = self._engine.step(request)
         said, shown = self._said, self._shown
-        events: list[tuple[LazyMetadata, View | None]] = [*self._engine.bystanders]
+        events: list[tuple[LazyMetadata, View | None]] = [
+            (each.metadata, each.view) for each in self._engine.bystanders
+        ]
         active = metadata["agentId"]
         events.insert(active, (metadata, view))
         self._said = [dict(each) for each, _ in events]
