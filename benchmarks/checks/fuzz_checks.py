@@ -18,6 +18,7 @@ from benchmarks.checks.invariants import (
     a_refusal_changed_nothing,
     floor_of,
     hand_agrees,
+    held_are_marked,
     stands_on_the_floor,
     values_are_plain,
 )
@@ -276,11 +277,11 @@ class CompanyChecker:
 
 def hands_agree(told: Sequence[Metadata]) -> Iterator[str]:
     """Each hand holds at most one object, and isPickedUp says which are in any."""
-    held = [entry for metadata in told for entry in metadata["inventoryObjects"]]
+    held = [entry["objectId"] for metadata in told for entry in metadata["inventoryObjects"]]
     for metadata in told:
         if len(metadata["inventoryObjects"]) > 1:
             yield f"agent {metadata['agentId']} holds {metadata['inventoryObjects']}"
-        yield from hand_agrees({**metadata, "inventoryObjects": held})
+        yield from held_are_marked(metadata, held)
 
 
 def keeps_apart(before: Metadata, after: Metadata, others: Sequence[Metadata]) -> Iterator[str]:

@@ -159,7 +159,8 @@ def repeat_command(plan: FuzzPlan, run: int) -> str:
     """The command that repeats a run."""
     every = tuple(plan.scenes) == tuple(SCENE_NAMES)
     scenes = "" if every else f" --scenes {','.join(plan.scenes)}"
+    agents = "" if plan.agents == 1 else f" --agents {plan.agents}"
     return (
-        f"python -m benchmarks.checks.fuzz --actions {plan.actions} --seed {plan.seed}{scenes} "
-        f"--run {run}"
+        f"python -m benchmarks.checks.fuzz --actions {plan.actions} --seed {plan.seed}{scenes}"
+        f"{agents} --run {run}"
     )

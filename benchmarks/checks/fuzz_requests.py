@@ -15,6 +15,7 @@ from types import NoneType
 from typing import Any, get_args, get_origin
 
 from er_gym.houses.generate import generate_house
+from er_gym.sim.actions.many import ObjectStates
 from er_gym.sim.actions.refused import REFUSED
 from er_gym.sim.actions.registry import ACTIONS, EXEMPT, Parameter, parameters_of
 from er_gym.sim.actions.state_change import LIQUIDS
@@ -158,9 +159,9 @@ def _position(room: Room) -> dict[str, float]:
     return position
 
 
-def _house(room: Room) -> Request:
-    """A house of one or two rooms."""
-    return deepcopy(generate_house(room.random.randrange(4), room.random.randint(1, 2)))
+def draw_house(room: Room) -> Request:
+    """A house of one to three rooms."""
+    return deepcopy(generate_house(room.random.randrange(12), room.random.randint(1, 3)))
 
 
 def _coordinate(axis: str) -> Draw:
@@ -212,6 +213,23 @@ def _arrangement(room: Room) -> list[Request]:
     return poses
 
 
+def _object_states(room: Room) -> Request:
+    """A state for all objects of a type."""
+    has = room.random.choice(("toggleable", "openable", "breakable", "dirtyable", "cookable"))
+    flags = [name for name, about in ObjectStates.model_fields.items() if about.annotation is bool]
+    value = room.random.random() < 0.5
+    return {
+        "objectType": _object_type(room),
+        "stateChange": has,
+        **dict.fromkeys(flags, value),
+    }
+
+
+def _vector(size: float) -> Draw:
+    """Three numbers, each at most so large."""
+    return lambda room: {axis: room.random.uniform(-size, size) for axis in "xyz"}
+
+
 OBJECT_CONDITIONS = {
     "PickupObject": ("pickupable", "isPickedUp"),
     "PutObject": ("receptacle", "isPickedUp"),
@@ -228,6 +246,9 @@ OBJECT_CONDITIONS = {
     "EmptyLiquidFromObject": ("isFilledWithLiquid",),
 }
 """The properties that an object must have for an action, and those that it must not have yet."""
+_HANDS = ("MoveHand", "MoveHeld", "RotateHand", "RotateHeld")
+HAND_ACTIONS = tuple(name for name in ACTIONS if name.startswith(_HANDS))
+"""Actions that move or turn the hand, which must hold something."""
 PICTURE_POINT_ACTIONS = (
     *(*OBJECT_CONDITIONS, "UseUpObject", "GetObjectInFrame", "GetCoordinateFromRaycast"),
     *("DirectionalPush", "PushObject", "PullObject", "TouchThenApplyForce"),
@@ -250,8 +271,29 @@ SANE: dict[str, Draw] = {
     "PushObject.moveMagnitude": _between(0.0, 300.0),
     "DirectionalPush.moveMagnitude": _between(0.0, 300.0),
     "objectId": _object(),
+    "objectId0": _object(),
+    "objectId1": _object(),
+    "SetObjectStates.SetObjectStates": _object_states,
+    "origin": _middle,
+    "destination": _middle,
+    "direction": _vector(1.0),
+    **{
+        f"{action}.{parameter}": _between(-0.2, 0.2)
+        for action in HAND_ACTIONS
+        if action.startswith("Move")
+        for parameter in ("x", "y", "z", "right", "up", "ahead", "moveMagnitude")
+        if parameter in PARAMETERS[action]
+    },
+    **{
+        f"{action}.{parameter}": _among(-90.0, -30.0, 0.0, 30.0, 90.0, 180.0)
+        for action in HAND_ACTIONS
+        if action.startswith("Rotate")
+        for parameter in ("x", "y", "z", "pitch", "yaw", "roll")
+        if parameter in PARAMETERS[action]
+    },
+    "RotateHeldObject.rotation": _vector(180.0),
     "sceneName": lambda room: room.random.choice(room.scenes),
-    "house": _house,
+    "house": draw_house,
     "forceAction": _among(False, True, True),
     "position": _position,
     "positions": _some(_position, 5),
@@ -400,12 +442,21 @@ MUTATIONS: tuple[Callable[[Room, Request], None], ...] = (
 )
 
 
+_WITH_A_FULL_HAND = (
+    *3 * HAND_ACTIONS,
+    *16 * ("PutObject",),
+    *4 * ("DropHandObject", "DropHeldObject", "ThrowObject", "PlaceHeldObject"),
+)
+
+
 def _next(room: Room) -> Sequence[str]:
     """Actions that a program might do now."""
     if room.poses:
         return ("TeleportFull",)
     if room.metadata["inventoryObjects"]:
-        return ("PutObject", "PutObject", "PutObject", "DropHandObject", "ThrowObject")
+        return _WITH_A_FULL_HAND
+    if any(entry["isFilledWithLiquid"] for entry in room.objects):
+        return ("EmptyLiquidFromObject", *NAMES)
     return NAMES
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
@@ -74,11 +74,20 @@ def nothing_contains_itself(metadata: Metadata) -> Iterator[str]:
 def hand_agrees(metadata: Metadata) -> Iterator[str]:
     """The hand holds at most one object; isPickedUp says which, and no receptacle contains it."""
     held = [entry["objectId"] for entry in metadata["inventoryObjects"]]
-    marked = [entry["objectId"] for entry in metadata["objects"] if entry["isPickedUp"]]
     if len(held) > 1:
         yield f"the hand holds {' and '.join(held)}"
+    yield from held_are_marked(metadata, held)
+
+
+def held_are_marked(metadata: Metadata, held: Sequence[str]) -> Iterator[str]:
+    """isPickedUp says what all hands hold, and no receptacle contains it.
+
+    Args:
+        held: the ids of what any agent holds.
+    """
+    marked = [entry["objectId"] for entry in metadata["objects"] if entry["isPickedUp"]]
     if sorted(held) != sorted(marked):
-        yield f"the hand holds {held}, and isPickedUp says {marked}"
+        yield f"the hand holds {list(held)}, and isPickedUp says {marked}"
     objects = _by_id(metadata)
     for object_id in held:
         if object_id in objects and objects[object_id]["parentReceptacles"]:

@@ -268,11 +268,11 @@ def test_questions_are_actions():
 def test_problems_are_shown_with_the_way_to_see_them_again(monkeypatch, capsys):
     run_instead(monkeypatch, "Pass", raises)
     monkeypatch.setattr("benchmarks.checks.fuzz_requests.NAMES", ["Pass"])
-    plan = FuzzPlan(seed=5, actions=8, scenes=("FloorPlan402",))
+    plan = FuzzPlan(seed=5, actions=8, scenes=("FloorPlan402",), agents=2)
     assert show(played(plan), plan, 1.0) == 1
     shown = capsys.readouterr().out
     assert "in FloorPlan402: {'action': 'Pass'" in shown
-    assert "--actions 8 --seed 5 --scenes FloorPlan402 --run 0" in shown
+    assert "--actions 8 --seed 5 --scenes FloorPlan402 --agents 2 --run 0" in shown
     assert "more where: raised at registry.py:" in shown
     assert "BROKEN: 8 actions" in shown
 
@@ -310,6 +310,18 @@ def test_several_agents_play_without_a_problem():
     report = play_run(0, plan=FuzzPlan(seed=2, actions=60, scenes=("FloorPlan403",), agents=4))
     assert not report.wrong
     assert report.total.tries == 60
+
+
+def test_two_agents_may_both_hold_something():
+    engine, checker = Engine(32, 24), CompanyChecker()
+    told(engine, action="Reset", sceneName="FloorPlan1")
+    told(engine, action="Initialize", agentCount=2)
+    for number, kind in enumerate(("Apple", "Mug")):
+        thing = engine.world.object_ids[engine.world.types.index(kind)]
+        request = {"action": "PickupObject", "objectId": thing, "forceAction": True}
+        seen = told(engine, agentId=number, **request)
+        assert seen[0][0]["inventoryObjects"]
+        assert not list(checker.sees(request, seen, engine.world))
 
 
 def told(engine, **request):

@@ -64,6 +64,14 @@ def test_questions_about_objects(kitchen):
     assert between["adjacent"] is (between["objectInWay"] == [])
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("narrow", [1e-310, 1e-320, 5e-324])
+def test_a_picture_of_almost_no_width_shows_no_point(kitchen, narrow):
+    kitchen.do("ChangeFOV", fieldOfView=narrow)
+    aside = {"x": 5.0, "y": 0.9, "z": 1.0}
+    assert "not in viewport" in kitchen.refused("WorldToViewportPoint", position=aside)
+
+
 def test_questions_about_sight(kitchen):
     kitchen.go_to(APPLE)
     seen = [e["objectId"] for e in kitchen.event.metadata["objects"] if e["visible"]]

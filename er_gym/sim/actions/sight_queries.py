@@ -185,8 +185,11 @@ def _in_viewport(world: World, points: np.ndarray) -> np.ndarray:
     right, up, ahead = ((points - agent.camera) @ camera_rotation(agent)).T
     half = tan(radians(settings.field_of_view / 2))
     safe = np.where(np.abs(ahead) < 1e-9, 1e-9, ahead)
-    x = 0.5 + right / (2 * half * safe * settings.width / settings.height)
-    return np.column_stack([x, 0.5 - up / (2 * half * safe), ahead])
+    aspect = settings.width / settings.height
+    with np.errstate(all="ignore"):  # a narrow picture may be infinitely many pictures away
+        x = 0.5 + right / (2 * half * safe * aspect)
+        y = 0.5 - up / (2 * half * safe)
+    return np.column_stack([x, y, ahead])
 
 
 @action("WorldToViewportPoint")
