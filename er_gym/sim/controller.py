@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, ClassVar
 
 from numpy.typing import NDArray
@@ -84,10 +84,14 @@ class EmbeddedEvent(ai2thor.server.Event):  # type: ignore[misc]  # untyped
         pass
 
 
+Attach = Callable[[EmbeddedEvent, View], None]
+"""Adds images to an event."""
+
+
 class BystanderEvent(EmbeddedEvent):
     """The event of an agent that did not act, whose pictures are drawn when they are first read."""
 
-    def __init__(self, bystander: Bystander, attach: Callable[[EmbeddedEvent, View], None]) -> None:
+    def __init__(self, bystander: Bystander, attach: Attach) -> None:
         super().__init__(bystander.metadata)
         own = self.__dict__
         without = {name: own.pop(name) for name in own.keys() - _WITHOUT_PICTURES}
@@ -116,6 +120,34 @@ class BystanderEvent(EmbeddedEvent):
         assert view is not None  # otherwise the event is a plain one
         attach(self, view)
         self.__dict__.update(put)
+
+
+class CrewEvent(ai2thor.server.MultiAgentEvent):  # type: ignore[misc]  # ai2thor is untyped
+    """The official event of several agents, which makes those of the others when they are read.
+
+    Args:
+        acting: the event of the agent that acted.
+        beside: makes the events of the others.
+    """
+
+    def __init__(self, acting: EmbeddedEvent, beside: Callable[[], list[EmbeddedEvent]]) -> None:
+        # What the official class does, which wants all events now.
+        self._active_event, self.metadata = acting, acting.metadata
+        self.screen_width, self.screen_height = acting.screen_width, acting.screen_height
+        self.third_party_camera_frames: list[Any] = []
+        self._beside = beside
+
+    @cached_property
+    def events(self) -> list[EmbeddedEvent]:
+        """The events of all agents, by their ids."""
+        events = self._beside()
+        events.insert(self.metadata["agentId"], self._active_event)
+        del self._beside
+        return events
+
+    def __getstate__(self) -> dict[str, Any]:
+        _ = self.events
+        return self.__dict__
 
 
 class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is untyped
@@ -148,9 +180,7 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
         event = self._event_of(metadata, frames)
         others = self.engine.bystanders
         if others:
-            events, active = [self._event_beside(each) for each in others], metadata["agentId"]
-            events.insert(active, event)
-            event = ai2thor.server.MultiAgentEvent(active, events)
+            event = CrewEvent(event, partial(self._beside, others, self._reader()))
         self._event = event
 
     def _event_of(self, metadata: LazyMetadata, frames: View | None) -> EmbeddedEvent:
@@ -159,13 +189,15 @@ class EmbeddedServer(ai2thor.server.Server):  # type: ignore[misc]  # ai2thor is
             self._reader()(event, frames)
         return event
 
-    def _event_beside(self, bystander: Bystander) -> EmbeddedEvent:
-        """The event of an agent that did not act."""
-        if bystander.undrawn and not self.add_depth_noise:  # whose chance goes by the order
-            return BystanderEvent(bystander, self._reader())
-        return self._event_of(bystander.metadata, bystander.view)
+    @staticmethod
+    def _beside(bystanders: tuple[Bystander, ...], attach: Attach) -> list[EmbeddedEvent]:
+        """The events of agents that did not act, and whose pictures may be drawn already."""
+        return [
+            EmbeddedEvent(each.metadata) if each.pictureless else BystanderEvent(each, attach)
+            for each in bystanders
+        ]
 
-    def _reader(self) -> Callable[[EmbeddedEvent, View], None]:
+    def _reader(self) -> Attach:
         """Adds the images to an event, with the depth of the present settings."""
         depth = {
             "depth_format": self.depth_format,

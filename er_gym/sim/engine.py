@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 from weakref import ReferenceType, ref
 
 from er_gym.sim.actions import perform
 from er_gym.sim.bystander import Bystander
-from er_gym.sim.crew import as_agent, copy_of
+from er_gym.sim.crew import copy_of
 from er_gym.sim.errors import ActionFailed, WrongCall
 from er_gym.sim.house.build import EMPTY, house_scene
 from er_gym.sim.lazy_metadata import LazyMetadata
@@ -77,7 +78,7 @@ class Engine:
         if light not in LIGHTS:
             raise ValueError(f"unknown light {light!r}; choose one of: {', '.join(LIGHTS)}")
         self._kind = metadata_kind
-        self._last: tuple[ReferenceType[LazyMetadata | Bystander], ...] = ()
+        self._last: list[ReferenceType[LazyMetadata | Bystander]] = []
         # What each agent of several did last, and with which answer.
         self._did: dict[int, tuple[str, Answer]] = {}
         self.bystanders: tuple[Bystander, ...] = ()
@@ -111,13 +112,11 @@ class Engine:
         report = metadata(now, name, *answer, self._kind)
         frames = draw(now) if request.get("renderImage", True) else None
         if several:
-            self.bystanders = self._watching(name, answer, frames)
-            unread: list[LazyMetadata | Bystander] = [report]
-            unread += (each.metadata for each in self.bystanders)
-            unread += (each for each in self.bystanders if each.undrawn)
-            self._last = (*(each for each in self._last if each() is not None), *map(ref, unread))
+            self.bystanders = self._watching(now, name, answer, frames)
+            unread: list[LazyMetadata | Bystander] = [report, *self.bystanders]
+            self._last = [*(each for each in self._last if each() is not None), *map(ref, unread)]
         else:
-            self._last = (ref(report),)
+            self._last = [ref(report)]
         self.world.settings = settings
         return report, frames
 
@@ -134,18 +133,30 @@ class Engine:
         other = world.others.get(number)
         return (world if other is None else other).held < 0
 
-    def _watching(self, name: str, answer: Answer, frames: View | None) -> tuple[Bystander, ...]:
-        """The agents that did not act, by their ids; each is told again what it did itself."""
+    def _watching(
+        self, world: World, name: str, answer: Answer, frames: View | None
+    ) -> tuple[Bystander, ...]:
+        """The agents that did not act, by their ids; each is told again what it did itself.
+
+        Args:
+            world: a copy, which no action changes.
+        """
         if name == "Initialize" and not answer.error:
             self._did = {}  # all did
-        self._did[self.world.acting] = name, answer
-        found = []
-        for number in sorted(self.world.others):
-            own = as_agent(self.world, number)
-            did, told = self._did.setdefault(number, (name, answer))
-            cameras = None if frames is None else frames.third_party
-            found.append(Bystander(metadata(own, did, *told, self._kind), own, cameras))
+        self._did[world.acting] = name, answer
+        cameras, found = None if frames is None else frames.third_party, []
+        for number in sorted(world.others):
+            did, said = self._did.setdefault(number, (name, answer))
+            told = partial(self._told, did, said)
+            found.append(Bystander(world, number, told, cameras, self._note))
         return tuple(found)
+
+    def _told(self, did: str, answer: Answer, own: World) -> LazyMetadata:
+        return metadata(own, did, *answer, self._kind)
+
+    def _note(self, told: LazyMetadata) -> None:
+        """Settle these metadata, too, before an object changes."""
+        self._last.append(ref(told))
 
     def do(self, act: Callable[[World], Any]) -> Answer:
         """Do something to the world, without metadata and images; what it raises is answered."""
@@ -155,11 +166,12 @@ class Engine:
 
     def _settle(self) -> None:
         """Compute and draw what readers may still want to know of the state before an action."""
-        for each in self._last:
+        unread, self._last = self._last, []
+        for each in unread:
             last = each()
             if last is not None:
                 last.settle()
-        self._last = ()
+        self._last = []  # what bystanders made just now is settled
 
     def _reset(self, request: Mapping[str, Any]) -> None:
         name = request.get("sceneName") or self.world.scene.name  # by default the same scene again

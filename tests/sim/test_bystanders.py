@@ -1,4 +1,4 @@
-"""The pictures of agents that did not act are drawn when they are read, and are those of then."""
+"""What agents that did not act are told and see is made when it is read, and is that of then."""
 
 from __future__ import annotations
 
@@ -44,19 +44,23 @@ def played(read):
     return events
 
 
-def pictures(event):
-    """Each picture of each agent, as bytes."""
+def all_of(event):
+    """What each agent is told, and each of its pictures as bytes."""
     return [
         [
-            None if picture is None else (picture.shape, picture.tobytes())
-            for picture in (
-                each.frame,
-                each.depth_frame,
-                each.instance_segmentation_frame,
-                *each.third_party_camera_frames,
-                *each.third_party_depth_frames,
-                *each.instance_masks.values(),
-            )
+            dict(each.metadata),
+            each.object_id_to_color,
+            *(
+                None if picture is None else (picture.shape, picture.tobytes())
+                for picture in (
+                    each.frame,
+                    each.depth_frame,
+                    each.instance_segmentation_frame,
+                    *each.third_party_camera_frames,
+                    *each.third_party_depth_frames,
+                    *each.instance_masks.values(),
+                )
+            ),
         ]
         for each in event.events
     ]
@@ -64,14 +68,14 @@ def pictures(event):
 
 @pytest.fixture(scope="module")
 def at_once():
-    """The pictures of a program that looks at all of them after each step."""
+    """What a program reads that looks at all of it after each step."""
     kept = []
-    played(lambda event: kept.append(pictures(event)))
+    played(lambda event: kept.append(all_of(event)))
     return kept
 
 
-def test_pictures_read_late_are_those_of_their_step(at_once):
-    late = [pictures(event) for event in played(lambda event: None)]
+def test_what_is_read_late_is_that_of_its_step(at_once):
+    late = [all_of(event) for event in played(lambda event: None)]
     assert late == at_once
     assert len({repr(each) for each in late}) > 5, "the pictures differ from step to step"
 
