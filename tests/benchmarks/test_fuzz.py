@@ -80,8 +80,8 @@ def test_every_action_is_tried_and_most_of_them_are_done(long_play):
     unchecked = {"SetObjectFilter", "SetObjectFilterForType"}  # they hide what the checks need
     assert {*ACTIONS, "Reset"} - unchecked <= long_play.tallies.keys()
     never = {name for name, tally in long_play.tallies.items() if not tally.successes}
-    # Most of these move a hand that is empty, or are given points that suit nothing.
-    assert len(never & ACTIONS.keys()) <= 36
+    # These need a state that is seldom there, and come ten times in such a play.
+    assert len(never & ACTIONS.keys()) <= 14
     assert 0.3 < long_play.total.successes / long_play.total.tries < 0.8
 
 
