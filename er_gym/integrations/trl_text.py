@@ -28,6 +28,7 @@ from er_gym.data.trajectory import Language
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.sources import Source
 from er_gym.integrations.conversation import OBS_MODE, Conversation
+from er_gym.integrations.reading import Reading
 from er_gym.tasks.task import Task
 
 
@@ -102,9 +103,11 @@ class TextRollouts:
                 messages, add_generation_prompt=True, return_dict=True
             )["input_ids"]
             rollouts.append(_Rollout(talk, messages, ids))
+        read = Reading(len(rollouts), tokenizer.pad_token_id)
         while going := [each for each in rollouts if not (each.talk.done or each.full)]:
-            for rollout, reply in zip(going, self._replies(going, trainer), strict=True):
+            for rollout, reply in zip(going, self._replies(going, read, trainer), strict=True):
                 _go_on(rollout, reply, tokenizer, trainer.max_completion_length)
+            read.keep([not (each.talk.done or each.full) for each in going])
         return {
             "prompt_ids": [each.prompt for each in rollouts],
             "completion_ids": [each.ids for each in rollouts],
@@ -118,24 +121,22 @@ class TextRollouts:
         source, dialect, language, arguments = self._made
         return Conversation(EmbodiedEnv(source, obs_mode=OBS_MODE, **arguments), dialect, language)
 
-    def _replies(self, rollouts: Sequence[_Rollout], trainer: Any) -> list[list[int]]:
+    def _replies(
+        self, rollouts: Sequence[_Rollout], read: Reading, trainer: Any
+    ) -> list[list[int]]:
         """The ids of the next reply in each rollout, its end included."""
-        pad = trainer.processing_class.pad_token_id
-        before = [each.prompt + each.ids for each in rollouts]
-        width = max(map(len, before))
-        device = trainer.accelerator.device
-        ids = torch.tensor([[pad] * (width - len(each)) + each for each in before], device=device)
-        mask = torch.tensor(
-            [[0] * (width - len(each)) + [1] * len(each) for each in before], device=device
-        )
         settings = copy.deepcopy(trainer.generation_config)
         settings.max_new_tokens = self._reply_tokens
         with (
             unwrap_model_for_generation(trainer.model_wrapped, trainer.accelerator) as model,
             torch.no_grad(),
         ):
-            found = model.generate(input_ids=ids, attention_mask=mask, generation_config=settings)
-        return [_to_end(each, trainer.eos_token_ids) for each in found[:, width:].tolist()]
+            inputs = read.inputs([each.prompt + each.ids for each in rollouts], model)
+            found = model.generate(**inputs, generation_config=settings)
+        width = inputs["input_ids"].shape[1]
+        replies = [_to_end(each, trainer.eos_token_ids) for each in found[:, width:].tolist()]
+        read.add(found, replies)
+        return replies
 
 
 def _to_end(ids: list[int], ends: Sequence[int]) -> list[int]:

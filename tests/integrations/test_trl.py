@@ -234,10 +234,12 @@ class ScriptedTrainer:
         self.generation_config = SimpleNamespace(max_new_tokens=longest)
         self.eos_token_ids = [tokenizer.eos_token_id]
         self.model_wrapped = self
+        self.device = "cpu"
+        self.config = None
         self._scripts = scripts
         self._said: dict[str, int] = {}
 
-    def generate(self, input_ids: Any, attention_mask: Any, generation_config: Any) -> Any:
+    def generate(self, input_ids: Any, attention_mask: Any, **_: Any) -> Any:
         import torch
 
         replies = []
