@@ -11,10 +11,11 @@ from benchmarks.leaderboard.packing import versions
 from benchmarks.leaderboard.problems import Problem
 from benchmarks.leaderboard.record_checks import by_records, by_suite
 from benchmarks.leaderboard.replaying import (
-    differences,
+    compared,
     foreign_pictures,
     picture_settings,
     pictures_of,
+    played_again,
 )
 from benchmarks.leaderboard.submission import Submission, read_submission
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -32,6 +33,7 @@ class Checked:
         path: the file.
         submission: what it holds; None if it cannot be read.
         problems: what is wrong; empty for an honest one.
+        episodes: its records; those that tell no side effects have them as the engine told them.
         replayed: how many episodes were played again.
         notes: what could not be checked here, in words.
     """
@@ -39,6 +41,7 @@ class Checked:
     path: Path
     submission: Submission | None
     problems: tuple[Problem, ...]
+    episodes: tuple[EpisodeRecord, ...] = ()
     replayed: int = 0
     notes: tuple[str, ...] = ()
 
@@ -70,19 +73,37 @@ def check(
     try:
         suite = find_suite(submission.header.manifest.suite)
     except ValueError as error:
-        return Checked(path, submission, (*found, Problem("suite", "", str(error))))
+        return Checked(
+            path, submission, (*found, Problem("suite", "", str(error))), submission.episodes
+        )
     found += by_suite(submission, suite)
     notes: list[str] = []
+    told = {each.key: each for each in submission.episodes}
     replayed = 0
     if replay and not any(each.kind in ("rules", "suite") for each in found):
         tasks = {task.id: task for task in suite.tasks}
         playable = [each for each in submission.episodes if each.task_id in tasks]
         with _Environments(submission.header.manifest.env) as environments:
             for replayed, record in enumerate(playable, 1):
-                found += _by_engine(environments, tasks[record.task_id], record)
+                try:
+                    again = played_again(environments["text"], tasks[record.task_id], record)
+                    words = [*compared(record, again)]
+                except (TypeError, ValueError) as error:
+                    words = [f"it cannot be played: {error}"]
+                else:
+                    told[record.key] = _whole(record, again)
+                found += [Problem("replay", record.key, each) for each in words]
                 say(replayed, len(playable))
             found += _by_pictures(environments, submission, tasks, notes)
-    return Checked(path, submission, tuple(found), replayed, tuple(notes))
+    episodes = tuple(told[each.key] for each in submission.episodes)
+    return Checked(path, submission, tuple(found), episodes, replayed, tuple(notes))
+
+
+def _whole(record: EpisodeRecord, again: EpisodeRecord) -> EpisodeRecord:
+    """A record with the side effects that the engine told, where it tells none: an older one."""
+    if record.side_effects is not None or again.side_effects is None:
+        return record
+    return record.model_copy(update={"side_effects": again.side_effects})
 
 
 # -- by the engine ---------------------------------------------------------------------------------
@@ -110,14 +131,6 @@ class _Environments:
         if obs_mode not in self._made:
             self._made[obs_mode] = EmbodiedEnv((), **{**self._arguments, "obs_mode": obs_mode})
         return self._made[obs_mode]
-
-
-def _by_engine(environments: _Environments, task: Task, record: EpisodeRecord) -> Iterator[Problem]:
-    try:
-        found = [*differences(environments["text"], task, record)]
-    except (TypeError, ValueError) as error:
-        found = [f"it cannot be played: {error}"]
-    yield from (Problem("replay", record.key, words) for words in found)
 
 
 def _by_pictures(

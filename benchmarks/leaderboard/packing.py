@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 from collections.abc import Mapping
 from hashlib import sha256
 from importlib import metadata
@@ -25,6 +26,8 @@ from er_gym.writing import file_stem, inside
 
 _PACKAGES = ("numpy", "pillow", "panda3d", "gymnasium", "ai2thor")
 """Whose versions may decide what an agent sees."""
+_FOLDER = re.compile(r"(^|:)(?:~|\.{0,2})/(?:.*/)?([^/]+?)/*$")
+"""Where a model lies: what stands before the folder, and the folder's name."""
 
 
 class CannotSubmit(ValueError):
@@ -60,6 +63,8 @@ def pack(
             model was shown, or a text holds what looks like a secret.
     """
     report = load_run(run)
+    spec = without_folders(report.manifest.agent)
+    manifest = report.manifest.model_copy(update={"agent": spec})
     if report.crashed or report.unusable or not report.episodes:
         raise CannotSubmit(
             f"{run} has {len(report.episodes)} episodes, of which {report.crashed} crashed, and "
@@ -72,9 +77,9 @@ def pack(
         if (found := _conversation(run, each.key)) is not None
     }
     header = Header(
-        name=name or report.manifest.agent,
+        name=name or spec,
         by=by,
-        manifest=report.manifest,
+        manifest=manifest,
         episodes=len(report.episodes),
         conversations=len(conversations),
         results=claims(report),
@@ -83,12 +88,20 @@ def pack(
         hardware={**machine(), **(hardware or {})},
     )
     # A record in a run directory names its run; outside of it, that shows where it comes from.
-    digest = report.manifest.digest
-    episodes = tuple(each.model_copy(update={"run": digest}) for each in report.episodes)
+    episodes = tuple(
+        each.model_copy(update={"run": manifest.digest, "agent": without_folders(each.agent)})
+        for each in report.episodes
+    )
     submission = Submission(header, episodes, conversations)
     sought = _refuse_secrets(run, submission)
     header = header.model_copy(update={"secrets": sought})
     return packed(Submission(header, episodes, conversations))
+
+
+def without_folders(spec: str) -> str:
+    """The spec of an agent or the name of a model without the folders in which it lies,
+    ``hf:/home/me/it`` as ``hf:it``: they mean nothing elsewhere, and may name a person."""
+    return _FOLDER.sub(r"\1\2", spec)
 
 
 def _conversation(run: Path, key: str) -> ConversationRecord | None:
@@ -105,7 +118,10 @@ def _conversation(run: Path, key: str) -> ConversationRecord | None:
             file = inside(run, part.path)
             if sha256(read_bytes(file)).hexdigest() != part.digest:
                 raise CannotSubmit(f"{file} is not the picture that the model was shown")
-    return found
+    rounds = [
+        each.model_copy(update={"model": without_folders(each.model)}) for each in found.rounds
+    ]
+    return found.model_copy(update={"agent": without_folders(found.agent), "rounds": rounds})
 
 
 def _refuse_secrets(run: Path, submission: Submission) -> int:

@@ -61,16 +61,15 @@ class Repeating:
         return Decision(action, step.thought, by=step.by, causes=tuple(step.causes))
 
 
-def differences(env: Playable, task: Task, record: EpisodeRecord) -> Iterator[str]:
-    """What comes out otherwise when the recorded actions are done again.
+def played_again(env: Playable, task: Task, record: EpisodeRecord) -> EpisodeRecord:
+    """The record that comes out when the recorded actions are done again.
 
     Args:
         env: like the one of the run.
         task: the episode's.
         record: what is claimed.
     """
-    again = play_episode(env, Repeating(record), task, record.seed, agent_name=record.agent)
-    yield from compared(record, again)
+    return play_episode(env, Repeating(record), task, record.seed, agent_name=record.agent)
 
 
 def compared(record: EpisodeRecord, again: EpisodeRecord) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -21,10 +22,10 @@ from agents.vlm.record import ConversationRecord
 from agents.vlm.settings import AgentSettings
 from benchmarks.cli import leaderboard as command
 from benchmarks.leaderboard import submission as files
-from benchmarks.leaderboard.board import HEAD, row
+from benchmarks.leaderboard.board import row
 from benchmarks.leaderboard.checking import Checked, check
 from benchmarks.leaderboard.months import fresh_of, month_seed
-from benchmarks.leaderboard.packing import CannotSubmit, claims, pack
+from benchmarks.leaderboard.packing import CannotSubmit, claims, pack, without_folders
 from benchmarks.leaderboard.page import page
 from benchmarks.leaderboard.problems import KINDS
 from benchmarks.leaderboard.secrets import FORMS, secrets_in
@@ -39,6 +40,7 @@ from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.tasks import jsonl_format
 from er_gym.tasks.suites import Suite, own_tasks
 from er_gym.tasks.task import Task
+from er_gym.tasks.types import GROUPS
 from er_gym.writing import file_stem
 
 SCENE = "FloorPlan301"
@@ -518,14 +520,16 @@ def test_the_page_shows_a_row_for_each_and_trusts_no_name(runs: Runs, tmp_path: 
     forged = runs.checked(consistent(without_failures(runs.script)), tmp_path, replay=False)
     assert (honest.problems, costly.problems) == ((), ())
     rows = [row(honest, {"bedroom": "2026-12"}), row(costly, {})]
-    told = dict(zip(HEAD, rows[0], strict=True))
+    told = rows[0]
     assert (told["Success, %"].text, told["95 %"].text) == ("25.0", "4.6 to 69.9")
     assert told["Tidy success, %"].text == "25.0"
-    assert told["Suite"].text == "bedroom (held out, 2026-12)"
-    assert told["Unseen room, %"].text == "25.0 of 4"
+    assert (told.suite, told.instances) == ("bedroom (held out, 2026-12)", "explore")
+    assert told["Unseen room, %"].text == "25.0 (4)"
+    assert [told[f"{group}, %"].text for group in GROUPS[:3]] == ["0.0 (1)", "50.0 (2)", "0.0 (1)"]
     assert told["US$ per solved task"].text == "-"
-    assert (told["Tasks"].text, told["Replayed"].text) == ("4/4", "4 episodes")
-    assert dict(zip(HEAD, rows[1], strict=True))["Replayed"].text == "no"
+    assert (told["Tasks"].text, told["Replayed"].text) == ("4 of 4", "4")
+    assert rows[1]["Replayed"].text == "no"
+    assert rows[1].suite == "bedroom (no month's)"
     text = page(rows, [forged])
     assert "<script>x" not in text
     assert "&lt;script&gt;x" in text
@@ -535,6 +539,55 @@ def test_the_page_shows_a_row_for_each_and_trusts_no_name(runs: Runs, tmp_path: 
     assert "Not listed" in text
     assert "dropped: " in text
     assert "http" not in text.replace("arXiv", "")
+
+
+def test_rows_that_do_not_compare_are_apart_and_references_are_marked(
+    runs: Runs, tmp_path: Path
+) -> None:
+    honest = row(runs.checked(runs.script, tmp_path, replay=False), {})
+    env = {**runs.script.header.manifest.env, "instances": "target"}
+    oracle = with_manifest(runs.script, env=env, agent="oracle")
+    helped = row(runs.checked(oracle, tmp_path, replay=False), {})
+    assert (honest.reference, helped.reference) == (False, True)
+    assert (honest["Kind"].text, helped["Kind"].text) == ("agent", "reference")
+    text = page([helped, honest], [])
+    explore, target = re.findall(r"<table id='board-\d'>.*?</table>", text, re.DOTALL)
+    assert text.index("instances explore</h2>") < text.index("instances target</h2>")
+    assert ("class=reference" in explore, "class=reference" in target) == (False, True)
+    assert "knows the key actions" in target
+    # What no row has is no column, and each is explained.
+    assert "US$" not in explore
+    assert "<dt>US$ per solved task</dt>" in text
+    assert explore.count("aria-sort=descending") == 1
+
+
+def test_the_engine_tells_the_side_effects_that_an_older_record_does_not(
+    runs: Runs, tmp_path: Path
+) -> None:
+    told = runs.script
+    for number in range(len(told.episodes)):
+        told = with_episode(told, number, side_effects=None)
+    told = consistent(told)
+    unplayed = runs.checked(told, tmp_path, replay=False)
+    assert row(unplayed, {})["Tidy success, %"].text == "-"
+    played = runs.checked(told, tmp_path)
+    assert not played.problems
+    assert played.episodes == runs.script.episodes
+    assert row(played, {})["Tidy success, %"].text == "25.0"
+
+
+def test_a_submission_does_not_say_where_a_model_lay() -> None:
+    told = {
+        "hf:/home/me/my models/it/": "hf:it",
+        "rl:~/runs/a-0": "rl:a-0",
+        "rl:../a-0": "rl:a-0",
+        "human+hf:/x/it": "human+hf:it",
+        "/home/me/it": "it",
+        "hf:org/model": "hf:org/model",
+        "zoo:all": "zoo:all",
+        "module:NAME": "module:NAME",
+    }
+    assert {spec: without_folders(spec) for spec in told} == told
 
 
 def test_the_commands_pack_check_and_build(
