@@ -5,8 +5,11 @@ from __future__ import annotations
 import importlib.util
 import pkgutil
 import re
+import runpy
 import shlex
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import click
 import pytest
@@ -28,6 +31,29 @@ def test_every_picture_and_page_is_there(repository: Path, page: str) -> None:
     for link in re.findall(r"\]\(([^)#]+)\)", (repository / page).read_text("utf-8")):
         if "://" not in link:
             assert (repository / link).exists(), link
+
+
+def test_an_index_shows_the_readme_without_a_link_to_nowhere(
+    repository: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Only what builds er-gym has hatchling.
+    hatch = SimpleNamespace(MetadataHookInterface=object)
+    monkeypatch.setitem(sys.modules, "hatchling.metadata.plugin.interface", hatch)
+    readable = runpy.run_path(str(repository / "hatch_build.py"))["readable_anywhere"]
+    readme = (repository / "README.md").read_text("utf-8")
+    links = re.findall(r"\]\(([^)]+)\)", readme)
+    elsewhere = [each for each in links if "://" in each]
+    inside = [each for each in links if "://" not in each]
+    assert len(inside) > 20
+    alone = readable(readme, "", "1.2")
+    assert re.findall(r"\]\(([^)]+)\)", alone) == elsewhere
+    assert "docs/results.md has the oracle" in alone
+    assert "![" not in alone
+    found = re.findall(r"\]\(([^)]+)\)", readable(readme, "https://example.org/x", "1.2"))
+    assert len(found) == len(links)
+    assert [each for each in found if not each.startswith("http")] == []
+    assert "https://example.org/x/blob/v1.2/docs/start.md" in found
+    assert "https://example.org/x/raw/v1.2/docs/images/rooms.jpg" in found
 
 
 def test_the_table_of_actions_tells_what_each_does(repository: Path) -> None:
