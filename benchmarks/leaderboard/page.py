@@ -21,7 +21,7 @@ def page(rows: Iterable[Row], refused: Sequence[Checked]) -> str:
         refused: submissions with problems, which are named at the end.
     """
     parts = [
-        f"<!-- Written by er-gym -->\n<!doctype html>\n<html lang='en'>\n{_HEAD}\n<body>",
+        f"<!-- Written by er-gym -->\n<!doctype html>\n<html lang='en'>\n{_HEAD}\n<body><main>",
         f"<h1>er-gym: leaderboard</h1>\n<p>{_ABOUT}</p>",
     ]
     in_order = sorted(rows, key=lambda each: (each.suite, each.instances, -_success(each)))
@@ -45,7 +45,7 @@ def page(rows: Iterable[Row], refused: Sequence[Checked]) -> str:
     if refused:
         lines = "\n".join(map(_refused, refused))
         parts.append(f"<h2>Not listed</h2>\n<ul>\n{lines}\n</ul>")
-    parts.append(f"<script>{_SCRIPT}</script>\n</body>\n</html>\n")
+    parts.append(f"<script>{_SCRIPT}</script>\n</main></body>\n</html>\n")
     return "\n".join(parts)
 
 
@@ -114,8 +114,9 @@ _ABOUT = (
     "Each row is a submission, a file that holds every step of a run. Its results were computed "
     "anew from these, and its actions were done again on the engine where the last column says so. "
     "Rows in <i>italics</i> are references, such as the oracle, which knows the answers: they show "
-    "what a figure is worth, and compete with none. Click on a column to sort by it. Columns that "
-    "no row of a table fills are left out. The rules are in docs/leaderboard.md."
+    "what a figure is worth, and compete with none. Click on a column to sort by it; a table "
+    "scrolls to the side. Columns that no row of a table fills are left out. The rules are in "
+    "docs/leaderboard.md."
 )
 _INSTANCES = {
     "explore": "The environment does not look at the task to choose which object a word such as "
