@@ -142,3 +142,21 @@ def test_a_state_holds_the_hand(room):
     assert (room[SOAP], hand(room)) == (thing, pose)
     room.do("MoveBack")
     assert np.abs(hand(room)["localPosition"]["z"] - 0.38) < 1e-9
+
+
+def test_a_refused_put_leaves_what_is_tilted_as_it_was_to_the_last_digit(room, monkeypatch):
+    counter = next(each for each in room.event.metadata["objects"] if each["receptacle"])
+    monkeypatch.setattr("er_gym.sim.actions.pick_place.free_spots", lambda *args, **more: iter(()))
+    for x, y, z in ((90, 30, 0), (45, 30, 0), (-30, 15, 11), (-30, 30, 11)):
+        for turns in (0, 1):
+            room.do("RotateHand", x=-30, y=30, z=0)
+            room.do("MoveHeldObjectDown", moveMagnitude=0.05)
+            for _ in range(turns):
+                room.do("RotateRight")
+            room.do("RotateHandRelative", x=180)
+            room.do("RotateHeldObject", pitch=90)
+            room.do("RotateHand", x=x, y=y, z=z)
+            before = room[SOAP]
+            said = room.refused("PutObject", counter["objectId"], forceAction=True)
+            assert "has no free space" in said
+            assert room[SOAP] == before

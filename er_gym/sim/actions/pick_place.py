@@ -100,13 +100,17 @@ def put_object(
     if not forceAction and not accepts(held, kind):
         raise ActionFailed(f"A {kind} does not take a {held}.")
     near = world.agent.position[[0, 2]]
-    hand = world.hand
+    hand, rows = world.hand, [*world.in_hand]
+    arrays = world.position, world.rotation, world.low, world.high
+    tilted = [array[rows] for array in arrays]
     if hand is not None:  # what is tilted is set upright
         world.pose_hand(None)
     spot = next(free_spots(world, i, receptacle, near, seen_by=world.agent), None)
     if spot is None:
         if hand is not None:
             world.pose_hand(hand)
+            for array, values in zip(arrays, tilted, strict=True):
+                array[rows] = values  # to the last digit
         raise ActionFailed(f"No valid positions to place {held}: {objectId} has no free space.")
     yaw, foot = spot
     # An object on a plate on a table is on the table too, but one in a fridge is not on the floor.
