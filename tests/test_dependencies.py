@@ -31,7 +31,7 @@ MAY_USE = {
     "er_gym/integrations/minari.py": ("minari",),
     "er_gym/integrations/ms_swift.py": ("ms-swift",),
     "er_gym/integrations/nemo_gym.py": ("nemo-gym",),
-    "er_gym/integrations/reading.py": ("trl",),
+    "er_gym/integrations/trl_reading.py": ("trl",),
     "er_gym/integrations/rllib.py": ("rllib",),
     "er_gym/integrations/skyrl_gym.py": ("skyrl-gym",),
     "er_gym/integrations/trl.py": ("trl",),

@@ -9,7 +9,7 @@ prints the table as Markdown.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from pathlib import Path
@@ -51,12 +51,7 @@ class ReinforcedRun:
         Raises:
             ValueError: it is not a run directory.
         """
-        file = path / REINFORCING.manifest
-        if not file.is_file():
-            raise ValueError(
-                f"{path} has no {REINFORCING.manifest}; give run directories of er-gym reinforce"
-            )
-        return ReinforcedRun(path, ReinforceManifest.model_validate_json(file.read_bytes()))
+        return ReinforcedRun(path, REINFORCING.read(path))
 
     @cached_property
     def curve(self) -> list[dict[str, float]]:
@@ -117,7 +112,7 @@ def _cells(runs: Sequence[ReinforcedRun]) -> tuple[str, ...]:
     )
 
 
-def _each(values: Any) -> str:
+def _each(values: Iterable[str]) -> str:
     return ", ".join(values)
 
 

@@ -28,7 +28,7 @@ from er_gym.data.trajectory import Language
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.sources import Source
 from er_gym.integrations.conversation import OBS_MODE, Conversation
-from er_gym.integrations.reading import Reading
+from er_gym.integrations.trl_reading import Reading
 from er_gym.tasks.task import Task
 
 

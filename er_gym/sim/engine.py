@@ -122,8 +122,7 @@ class Engine:
 
     def _keeps_objects(self, name: str, request: Mapping[str, Any]) -> bool:
         """Whether an action of one of several agents leaves all objects as they are. Then what was
-        told before can be computed later: it is of a copy of the world, which has its own poses.
-        """
+        told before can be computed later: it is of a copy of the world, which has its own poses."""
         world, agent = self.world, request.get("agentId")
         if not world.others or name not in _WALKS or len(self._last) > _MOST_UNSETTLED:
             return False

@@ -59,7 +59,7 @@ def test_seeds_of_a_row_are_one_line(tmp_path: Path) -> None:
 
 
 def test_what_is_no_run_or_no_setting(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"has no reinforce\.json; give run directories"):
+    with pytest.raises(ValueError, match="is no reinforcement run"):
         ReinforcedRun.load(tmp_path)
     run = run_at(tmp_path / "a", "rloo", 0, 0.5)
     for name in ("advantage.rows", "advantage.row.more", "nothing"):

@@ -100,10 +100,10 @@ def put_object(
     if not forceAction and not accepts(held, kind):
         raise ActionFailed(f"A {kind} does not take a {held}.")
     near = world.agent.position[[0, 2]]
-    hand, rows = world.hand, [*world.in_hand]
-    arrays = world.position, world.rotation, world.low, world.high
-    tilted = [array[rows] for array in arrays]
+    hand = world.hand
     if hand is not None:  # what is tilted is set upright
+        rows, arrays = world.in_hand, (world.position, world.rotation, world.low, world.high)
+        tilted = [array[rows] for array in arrays]
         world.pose_hand(None)
     spot = next(free_spots(world, i, receptacle, near, seen_by=world.agent), None)
     if spot is None:

@@ -15,7 +15,7 @@ END, PAD, LONGEST = 1, 0, 6
 
 
 def test_replies_are_those_of_conversations_alone() -> None:
-    from er_gym.integrations.reading import Reading
+    from er_gym.integrations.trl_reading import Reading
 
     torch.manual_seed(3)
     config = transformers.Qwen3Config(
