@@ -31,6 +31,7 @@ from er_gym.envs.saved_episode import BROKEN_OFF, SavedEpisode
 from er_gym.envs.sources import GENERATE, EpisodeSource, Source, make_source
 from er_gym.envs.window import Window
 from er_gym.houses.names import is_house, named
+from er_gym.tasks.goal import Condition
 from er_gym.tasks.task import AgentPose, Task
 from er_gym.tasks.types import types_named
 from er_gym.thor import BACKENDS, LIGHTS, RENDER_DEVICES, check_size, make_controller
@@ -335,6 +336,12 @@ class EmbodiedEnv(SavedEpisode, gymnasium.Env[dict[str, Any], Any]):
     def agent_pose(self) -> AgentPose:
         """Where the agent is now."""
         return self._current("asking for the agent's pose").perception.pose
+
+    @property
+    def unmet_now(self) -> tuple[Condition, ...]:
+        """The conditions of the task's goal that do not hold now."""
+        with self._lock:
+            return self._current("asking for the goal").unmet_now()
 
     @property
     def objects(self) -> Sequence[Mapping[str, Any]]:

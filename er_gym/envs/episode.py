@@ -240,6 +240,10 @@ class Episode:
         """AI2-THOR's metadata of all objects, as they are now."""
         return self._controller.last_event.metadata["objects"]  # type: ignore[no-any-return]
 
+    def unmet_now(self) -> tuple[Condition, ...]:
+        """The conditions of the task's goal that do not hold now."""
+        return unmet_conditions(self.task.goal, self._objects_of_goal(), self._available.in_reach)
+
     def step(self, understood: Action | None, text: str) -> StepResult:
         """Do an action that :meth:`parse_action` returned."""
         self._fault = ""
@@ -300,9 +304,7 @@ class Episode:
         if not outcome.success:
             return 0.0
         if action.verb == verbs.END and self.task.goal:
-            self._goal_unmet = unmet_conditions(
-                self.task.goal, self._objects_of_goal(), self._available.in_reach
-            )
+            self._goal_unmet = self.unmet_now()
         self._progress, reward = self._progress.after(
             action.verb,
             action.object_type,

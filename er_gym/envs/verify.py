@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
@@ -12,7 +11,7 @@ from er_gym.tasks import verbs
 from er_gym.tasks.difficulty import difficulty
 from er_gym.tasks.generate import Generator
 from er_gym.tasks.generate.generator import DONE_ALREADY
-from er_gym.tasks.goal import unmet_conditions
+from er_gym.tasks.goal import Condition
 from er_gym.tasks.splits import UNSEEN_TYPES, subject_types
 from er_gym.tasks.suite_spec import SuiteSpec
 from er_gym.tasks.task import AgentPose, Task
@@ -59,8 +58,8 @@ class PlayableEnv(Protocol):
         """The agent's pose now."""
 
     @property
-    def objects(self) -> Sequence[Mapping[str, Any]]:
-        """AI2-THOR's metadata of all objects, as they are now."""
+    def unmet_now(self) -> tuple[Condition, ...]:
+        """The conditions of the task's goal that do not hold now."""
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -103,7 +102,7 @@ class Verifier:
         info = with_details(self._env, told)
         pose = self._env.agent_pose
         where = (pose.x, pose.z)
-        if task.goal and not unmet_conditions(task.goal, self._env.objects, info["interactable"]):
+        if task.goal and not self._env.unmet_now:
             return Verdict(DONE_ALREADY, "; ".join(map(str, task.goal)), 1, where)
         solver = Solver()
         earned, over = 0.0, False

@@ -96,13 +96,16 @@ def unmet_conditions(
         condition
         for condition in goal
         if (condition.in_reach and not is_among(condition.object_type, in_reach))
-        or not any(_holds(condition, entry, kind_of) for entry in objects)
+        or not any(
+            _holds(condition, entry, kind_of)
+            for entry in objects
+            if entry["objectType"] == condition.object_type
+        )
     )
 
 
 def _holds(condition: Condition, entry: Mapping[str, Any], kind_of: Mapping[str, str]) -> bool:
-    if entry["objectType"] != condition.object_type:
-        return False
+    """Whether a condition holds for an object of its type."""
     if not is_present(entry) and _CUT_UP.isdisjoint(name for name, _ in condition.state):
         return False  # the object was cut into parts, and the condition is not about that
     if condition.object_id and entry["objectId"] != condition.object_id:

@@ -27,6 +27,7 @@ ASKED: dict[str, Callable[[Any], object]] = {
     "task": lambda env: env.task,
     "agent_pose": lambda env: env.agent_pose,
     "objects": lambda env: env.objects,
+    "unmet_now": lambda env: env.unmet_now,
 }
 
 

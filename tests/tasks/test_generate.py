@@ -38,7 +38,9 @@ from rooms_by_hand import (
 
 from er_gym.tasks import TASK_TYPES
 from er_gym.tasks.generate import GENERATED_TYPES, generate_tasks
+from er_gym.tasks.generate.composite import sequence
 from er_gym.tasks.generate.generator import DONE_ALREADY, SAME_PLACES
+from er_gym.tasks.generate.transport import transfer, transfers
 from er_gym.tasks.goal import Condition
 
 # -- who qualifies -------------------------------------------------------------------------------
@@ -312,3 +314,18 @@ def test_each_transfer_begins_two_sequences_at_most() -> None:
     tasks = tasks_of(SEQUENCE, [*FURNITURE, APPLE, EGG, MUG, DESK])
     firsts = Counter(tuple(about(task).split("-")[:2]) for task in tasks)
     assert set(firsts.values()) <= {1, 2}
+
+
+def test_two_independent_transfers_name_together_what_each_names_alone() -> None:
+    graph = room_of([*OFFICE, *FURNITURE, APPLE, BOWL, EGG, MUG, book(1, "Shelf")]).scene_graph
+    moves = [*transfers(graph, hidden=False), *transfers(graph, hidden=True)]
+    pairs = [
+        (one, other)
+        for one in moves
+        for other in moves
+        if len({each.type for each in (*one, *other)}) == 4
+    ]
+    assert len(pairs) > 50
+    for one, other in pairs:
+        named = transfer(graph, *one).named | transfer(graph, *other).named
+        assert sequence(graph, *one, *other).named == named

@@ -7,8 +7,14 @@ from itertools import cycle, islice
 
 from er_gym.tasks.generate.plan_builder import PlanBuilder
 from er_gym.tasks.generate.scene_graph import SceneGraph, SceneObject
-from er_gym.tasks.generate.task_plan import TaskPlan, TaskRule, from_templates, plan_from
-from er_gym.tasks.generate.transport import transfers
+from er_gym.tasks.generate.task_plan import (
+    TaskPlan,
+    TaskRule,
+    differ_in_type,
+    from_templates,
+    plan_from,
+)
+from er_gym.tasks.generate.transport import transfer, transfers
 from er_gym.tasks.wordings.english import ENGLISH
 from er_gym.tasks.wordings.words import in_or_on_the
 
@@ -37,14 +43,18 @@ def sequence(
 def _sequences(graph: SceneGraph) -> Iterator[tuple[SceneObject, ...]]:
     """Some pairs of transfers: each transfer is the first one of a few pairs."""
     moves = [*transfers(graph, hidden=False), *transfers(graph, hidden=True)]
+    # Two independent transfers name in sequence what each names alone, and planning every pair
+    # would take most of the time of a house.
+    named = [transfer(graph, *move).named for move in moves]
     for index, (obj, target) in enumerate(moves):
+        if not differ_in_type(named[index]):
+            continue
         start = index + len(moves) // 2
-        partners = islice(cycle(moves), start, start + len(moves))
+        partners = islice(cycle(zip(moves, named, strict=True)), start, start + len(moves))
         choices = (
             (obj, target, second, where)
-            for second, where in partners
-            if _independent(obj, target, second, where)
-            and sequence(graph, obj, target, second, where).one_object_per_type
+            for (second, where), others in partners
+            if _independent(obj, target, second, where) and differ_in_type(named[index] | others)
         )
         yield from islice(choices, _PARTNERS)
 

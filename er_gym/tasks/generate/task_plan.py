@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar, overload
 
@@ -35,10 +35,14 @@ class TaskPlan:
     dirty: tuple[str, ...] = ()
 
     @property
+    def named(self) -> frozenset[tuple[str, str]]:
+        """Type and id of each object of the plan's key actions."""
+        return frozenset((action.object_type, action.object_id) for action in self.key_actions)
+
+    @property
     def one_object_per_type(self) -> bool:
         """Whether the objects of the plan's key actions all differ in type."""
-        named = {(action.object_type, action.object_id) for action in self.key_actions}
-        return len(named) == len({object_type for object_type, _ in named})
+        return differ_in_type(self.named)
 
     @property
     def scored(self) -> tuple[tuple[str, str], ...]:
@@ -46,6 +50,11 @@ class TaskPlan:
         return tuple(
             (a.verb, a.object_type) for a in self.key_actions if a.verb not in verbs.UNSCORED
         )
+
+
+def differ_in_type(named: Collection[tuple[str, str]]) -> bool:
+    """Whether objects, each a type and an id, all differ in type."""
+    return len(named) == len({object_type for object_type, _ in named})
 
 
 def plan_from(
