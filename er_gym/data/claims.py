@@ -254,17 +254,29 @@ def _is_shut(thought: Thought, holder: Mention) -> bool:
     )
 
 
-def _holders(thought: Thought, each: SeenObject, view: Sequence[SeenObject]) -> set[str]:
-    """The types of all that a thing in view lies in or on, innermost first."""
+def _holders(each: SeenObject, view: Sequence[SeenObject]) -> frozenset[str]:
+    """The types of all that a thing in view lies in or on."""
+    above: dict[str, list[str]] = {}
+    for other in view:
+        above.setdefault(other.type, []).append(other.on)
+    return _upwards(each.on, above)
+
+
+def holders_of(thought: Thought, place: str) -> frozenset[str]:
+    """The types of a place and of all that it was ever seen to be in or on."""
+    return _upwards(place, thought.known.rested)
+
+
+def _upwards(place: str, above: Mapping[str, Sequence[str]]) -> frozenset[str]:
     found: set[str] = set()
-    upwards = [each.on]
+    upwards = [place]
     while upwards:
         holder = upwards.pop()
         if holder and holder not in found:
             found.add(holder)
             found |= PARTS.get(holder, frozenset())
-            upwards += [other.on for other in view if other.type == holder]
-    return {*all_interchangeable(each for each in found if each in OBJECT_TYPES)}
+            upwards += above.get(holder, ())
+    return all_interchangeable(each for each in found if each in OBJECT_TYPES)
 
 
 def not_on(thought: Thought, mention: Mention, holder: Mention) -> str:
@@ -281,7 +293,7 @@ def not_on(thought: Thought, mention: Mention, holder: Mention) -> str:
         properties = OBJECT_TYPES[each.type].properties
         if "pickupable" not in properties and not (each.on and "moveable" in properties):
             return ""
-        holders = _holders(thought, each, thought.views[direction])
+        holders = _holders(each, thought.views[direction])
         if holders & holder.types:
             return ""
         if not each.on and not holder.types & thought.in_view:

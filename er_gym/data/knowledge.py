@@ -69,6 +69,8 @@ class Knowledge:
             ``""`` for the start) where it was in view last.
         lay: of those, on what each lay when it was in view last, or where the agent has put it
             since.
+        rested: of those, all on which each was seen to lie or was put, in order; ``""`` for what
+            was seen on nothing.
         sightings: every such type, with all places from which it was in view, in order.
         visits: the places searched for the present subgoal, in order.
         navigable, interactable: the object types that are legal targets now.
@@ -91,6 +93,7 @@ class Knowledge:
     views: Mapping[str, Sequence[SeenObject]] = field(default_factory=dict)
     seen: Mapping[str, str] = field(default_factory=dict)
     lay: Mapping[str, str] = field(default_factory=dict)
+    rested: Mapping[str, Sequence[str]] = field(default_factory=dict)
     sightings: Mapping[str, Sequence[str]] = field(default_factory=dict)
     visits: Sequence[Visit] = ()
     navigable: Sequence[str] = ()
@@ -136,6 +139,7 @@ def knowledge_at(
     turn, before = turns[index], turns[:index]
     seen: dict[str, str] = {}
     lay: dict[str, str] = {}
+    rested: dict[str, dict[str, None]] = {}
     sightings: dict[str, dict[str, None]] = {}
     for each in (*before, turn):
         around = (one for view in each.views.values() for one in view)
@@ -144,8 +148,10 @@ def knowledge_at(
             sightings.setdefault(one.type, {})[each.at] = None
             if one.type != each.held:
                 lay[one.type] = one.on
+                rested.setdefault(one.type, {})[one.on] = None
         if each is not turn and each.success and each.verb == verbs.PUT and each.held:
             lay[each.held] = each.object_type
+            rested.setdefault(each.held, {})[each.object_type] = None
     actions = [
         LastAction(
             action=each.action,
@@ -167,6 +173,7 @@ def knowledge_at(
         at=turn.at,
         seen=seen,
         lay={kind: on for kind, on in lay.items() if on and kind != turn.held},
+        rested={name: tuple(places) for name, places in rested.items()},
         sightings={name: tuple(places) for name, places in sightings.items()},
         visits=_visits(before, turn.subgoal),
         navigable=turn.navigable,

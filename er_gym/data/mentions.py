@@ -114,7 +114,7 @@ _DETERMINERS = frozenset(
     """.split()
 )
 _NO_NAME = re.compile(
-    r"(?:the )?(?:picture|image) (?:shows|does|is|i)\b|(?:in|from|of) (?:the|this|my|a) picture\b"
+    r"a (?:bath|shower|drawer of|range of|set of)(?: for\b|$)|a bath\b|(?:the )?(?:picture|image) (?:shows|does|is|i)\b|(?:in|from|of) (?:the|this|my|a) picture\b"
     r"|the (?:key|keys) (?:point|thing|is|to|idea|question|here|for|part|step|lies)\b"
     r"|(?:the|this|that|a) light of\b|the (?:full|whole|wide)? ?range of\b|range\b"
     r"|(?:a|the) safe (?:bet|choice|place|guess|assumption|distance|side)\b"

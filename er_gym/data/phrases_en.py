@@ -121,7 +121,7 @@ PHRASES = Phrases(
         r"\b(?:usually|often|typically|normally|commonly|generally|tend(?:s)? to|people|someone who"
         r"|such as|things like|like an?|a place for|places? where|spots? for|spot where|kind of|sort of place"
         r"|natural|in general|in most|most (?:homes|kitchens|bathrooms|bedrooms|households)|kitchens"
-        r"|households|homes|frowned upon|common(?:ly)?|frequently|sometimes|regularly|as a rule|ordinarily|one would"
+        r"|households|homes|frowned upon|common(?:ly)?|frequently|sometimes|regularly|as a rule|ordinarily|one would|worth"
         r"|makes sense|logical|reasonable|makes? (?:a|it) good|is where (?:people|one|you)|are (?:usually )?(?:kept|stored))\b"
     ),
     past=re.compile(
@@ -276,8 +276,12 @@ PHRASES = Phrases(
         r"\b(?:so|now|therefore|thus|hence|next|then|accordingly),? i(?= )",
         r"\b(?:this (?:very )?(?:moment|minute|instant)|before anything else),? i(?:'ll)?(?= )",
         r"\bi'm(?= (?:now )?(?:off|on my way|headed) to\b)|^(?:and |so |now |but )*(?=off to )",
-        r"\bi(?:'m| am)(?: now| just| simply| therefore)?(?= (?:going|heading|walking|moving|running|opening|pulling|closing|shutting|picking|grabbing|taking|fetching|putting|placing|dropping|setting|switching|turning)\b)",
-        r"^i(?= (?:now |therefore |simply |then )?(?:go|head|walk|open|close|shut|pick|take|grab|place|switch|toggle|navigate|return|approach)\b)",
+        r"\bi(?:'m| am)(?: now| just| simply| therefore)?(?= (?:swinging|sliding|pressing|flipping|flicking|grasping|lifting|collecting|bringing|carrying|stepping|returning|checking|searching|looking around|ending|stopping|finishing|laying|leaving (?:it|the §|§)|going|heading|walking|moving|running|opening|pulling|closing|shutting|picking|grabbing|taking|fetching|putting|placing|dropping|setting|switching|turning)\b)",
+        r"\b(?:this (?:very )?(?:moment|second|instant)|right now|without delay|at once|here and now|before anything else|first of all|from here|straight away),? i(?:'m|'ll| am| will)?(?= )",
+        r"\bi(?: now| hereby)? (?:declare|consider|count|call) [^,.;]{0,30}\b(?:and|,)(?= (?:end|stop|finish|leave|call))",
+        r"(?:^|: |, |; )(?:and |so |now |then |next |but |well |right )*(?=(?:off|over|on|back|across|straight|up) (?:over |on |back |straight )?to (?:the|that|this|my) )",
+        r"(?:^|: |, |; )(?:and |so |now |then |well |right )*(?=to the (?:[a-z]+ )?§(?:,? (?:then|now|next|i go)\b|[.!]|$))",
+        r"^i(?= (?:now |therefore |simply |then )?(?:take|press|flip|end|stop|finish|swing|slide|pull|step|look around|go|head|walk|open|close|shut|pick|take|grab|place|switch|toggle|navigate|return|approach)\b)",
     ),
     before_act=re.compile(_BEFORE_ACT),
     weak=re.compile(r"\b(?:should|must|need to|have to|want to|ought to|ready to)$"),
@@ -286,22 +290,22 @@ PHRASES = Phrases(
         "look around": re.compile(
             r"(?:stop and )?(?:observe\b(?! (?:the|that|how|what) §)|(?:look|glance|take a (?:good |quick |full )?look|have a look|turn)(?: all)? (?:around|about|round)\b(?! §)|(?:scan|observe|survey|view)(?: the| my| this)?(?: whole| entire| rest of the)? (?:room|surroundings|area|kitchen|bathroom|bedroom|living room|scene))"
         ),
-        "go": _act(_GO, rf"(?:(?:back|over|straight|right|directly|on|up|across|down|now|out|first|to|towards?|for|near|off|close) )+{_D}{_X}"),
+        "go": _act(_GO + "/to/over/on/back/across/straight/up", rf"(?:(?:back|over|straight|right|directly|on|up|across|down|now|out|first|to|towards?|for|near|off|close) )+{_D}{_X}"),
         "visit": _act("approach/visit/try/return to/make for", _AND_SO),
         "check": _act(
             "check/search/inspect/examine/investigate/explore/look/peek/take a look/take a closer look/have a look/have a closer look/see what is/rummage",
             rf"(?:(?:in|into|inside|at|on|under|behind|through|over|closely|around|out|more|once|again|beneath|next|what|is|near|by) )*{_D}{_X}",
         ),
-        "open": re.compile(rf"(?:opening|pulling open|open|open up|pull open) {_D}{_X}|(?:pulling|pull|swing|slide) {_D}(?P<x2>{MARK}) open"),
-        "close": _act("closing|shutting|close|shut", _AND_SO),
+        "open": re.compile(rf"(?:opening|pulling open|open|open up|pull open) {_D}{_X}|(?:pulling|swinging|sliding|flinging|pull|swing|slide|fling) {_D}(?P<x2>{MARK}) open"),
+        "close": re.compile(rf"(?:closing|shutting|close|shut) {_AND_SO}|(?:swinging|pushing|sliding|pulling|swing|push|slide|pull) {_D}(?P<x2>{MARK})(?: door| lid)? (?:shut|closed|to|back in|home)\b"),
         "put": re.compile(
             rf"(?:putting|placing|dropping|setting|put|place|set|drop|leave|lay|deposit|store|insert|bring|carry|deliver|transport) (?:it|them|this|{_D}{MARK})(?: \w+)? (?:in|into|on|onto|to|inside|on top of|over to|down on) {_D}{_X}"
             rf"|(?:taking|take) (?:it|them|this|{_D}{MARK})(?: (?:back|along|over|straight|right))* (?:into|onto|to|over to) {_D}(?P<x2>{MARK})"
         ),
         "take": _act("picking up|picking|taking out|taking|grabbing|fetching|pick up|pick|take out|take|grab|grasp|get|fetch|collect|lift|retrieve", _AND_SO),
-        "toggle": re.compile(rf"(?:turning|switching|turn|switch|power|toggle|flip|press|activate|deactivate|light)(?: on| off)? {_D}{_X}"),
+        "toggle": re.compile(rf"(?:turning|switching|pressing|flipping|flicking|powering|lighting|turn|switch|power|toggle|flip|flick|press|activate|deactivate|light)(?: on| off| up| down)? {_D}{_X}|(?:turning|switching|turn|switch) (?:it|them) (?:on|off)\b"),
         "slice": _act("slice|cut|chop", _AND_SO),
-        "end": re.compile(r"(?:end|finish|stop(?! and\b)|conclude|wrap up|call it)(?: the task| here| now| it| this| there| my| everything| the)?\b"),
+        "end": re.compile(r"(?:ending|stopping (?:here|now)|end|finish|stop(?! and\b)|conclude|wrap up|call it)(?: the task| here| now| it| this| there| my| everything| the)?\b"),
     },
     later=re.compile(
         r"\b(?:later|afterwards?|after|eventually|finally|in the end|then|once|subsequently|at the end|lastly|next i|second|secondly|as well|also|still|come back|if need be|if necessary|only|and then|if|unless|when|until|before|otherwise|could|might|would|don't|not|no|never|rather than|instead of)\b|n't\b"

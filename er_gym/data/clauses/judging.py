@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from er_gym.data.action_claims import decided
-from er_gym.data.clauses import deeds, loose, measures, reasons, sights, states
+from er_gym.data.clauses import beyond, deeds, glances, loose, measures, reasons, sights, states
 from er_gym.data.clauses.reading import Verdict
 from er_gym.data.thought import Thought
 
@@ -32,6 +32,10 @@ JUDGES: tuple[Callable[[Thought], Iterator[Verdict]], ...] = (
     reasons.judge_untouched,
     reasons.judge_turned_down,
     reasons.judge_own_words,
+    beyond.judge_beyond,
+    glances.judge_before_me,
+    glances.judge_never_loosely,
+    glances.judge_lay,
     loose.judge_hand_loosely,
     loose.judge_ease,
     loose.judge_taken,

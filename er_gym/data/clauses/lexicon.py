@@ -42,6 +42,10 @@ class Lexicon:
         room_in_general: a room is named, but not as this one.
         states: ``x`` is in a state, with the groups of
             :attr:`er_gym.data.phrases.Phrases.states`.
+        loose_states: the same in looser words, ``said`` between the name and the state.
+        being: in that: it is told that it is so.
+        is_someone: that is who made it so.
+        all_of, all_after: before or after ``x``: every one of them.
         none_of: before ``x``: none of them.
         state_since: after a state: it is another one since.
         at_times: what is told is told of another time.
@@ -97,6 +101,11 @@ class Lexicon:
     any_room: Words
     room_in_general: Words
     states: Sequence[Words]
+    loose_states: Sequence[Words]
+    being: Words
+    is_someone: Words
+    all_of: Words
+    all_after: Words
     none_of: Words
     state_since: Words
     at_times: Words

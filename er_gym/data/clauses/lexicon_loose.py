@@ -68,7 +68,10 @@ SENT = _words(
 )
 FIRST = re.compile(r"\bfirst\b|第一|首先")
 REORDERS = re.compile(r"\b(?:before|after)\b|之前|以前|之后|以后", re.IGNORECASE)
-QUOTED = re.compile(r"[\"“「『‘']([^\"”」』’]{4,120})[\"”」』’']")
+QUOTED = re.compile(
+    r"[\"“「『]([^\"”」』]{4,120})[\"”」』]|(?<![a-z])[‘']([^\"’']{4,120})[’'](?![a-z])",
+    re.IGNORECASE,
+)
 ANSWERED = _words(
     r"\b(?:said|told|says|answer|message|reply|replied|feedback|system|response|it)\b|^[\"“]you can",
     r"提示|系统|反馈|回复|回答|消息|说",

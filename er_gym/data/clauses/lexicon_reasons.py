@@ -79,6 +79,10 @@ ENGLISH = ReasonWords(
     all_well=re.compile(
         r"\b(?:everything|all) (?:(?:that )?i(?:'ve| have)? (?:so far )?(?:tried|done|did|attempted|reached for)|so far)(?: so far)?(?: has| have)? (?:worked|succeeded|went (?:well|fine|smoothly)|gone (?:well|smoothly|fine|to plan)|come (?:off|to hand)|came (?:off|to hand))\b"
         r"|\b(?:no (?:action|attempt|step|try|move)|none of my (?:actions|attempts|steps|tries|moves)|not (?:one|a single)(?: one)? (?:of my )?(?:actions?|attempts?|steps?|tries|moves?)) (?:of mine )?(?:has |have |had )?(?:so far |yet |ever )?(?:failed|gone wrong|misfired|been refused|been rejected)"
+        r"|\b(?:whatever|everything|anything|every single thing|all (?:that )?)(?: that)? ?i(?:'ve| have)? (?:tried|reached for|went for|attempted|wanted|grabbed at|set out|asked for|put my hand)[^.;?]{0,30}\b(?:i(?:'ve| have)? (?:took|got|taken|picked|grabbed|had|managed|succeeded|done)|came|worked|succeeded|went|was mine|has worked|gave in|obliged)"
+        r"|\b(?:every|each)(?: single| one of my)? (?:attempt|try|tries|grab|action|step|move|reach|pickup|command|order)s?\b[^.;?]{0,30}\b(?:worked|succeeded|success|came off|paid off|hit|landed|went (?:well|fine|smoothly|through)|gone (?:well|through)|did what|been obeyed|was obeyed|done)"
+        r"|\b(?:not|never|n't)(?: once| yet| ever| a single time)* (?:failed|missed|slipped|been refused|been turned down|come up empty|been denied|fumbled)(?: (?:once|yet|so far|at all|a single time))?(?=$|[,.;!])"
+        r"|\b(?:isn't|not|hardly) (?:as though|as if) anything (?:had|has) gone wrong|\bnothing (?:had|has|'s)? ?(?:ever )?gone wrong|\b(?:hasn't|haven't) been a (?:single )?(?:failure|slip|refusal|hitch|miss)\b|\b(?:a|an) (?:clean|perfect|spotless|flawless|unbroken) (?:record|run|streak|sheet|series)|\bno (?:failures?|refusals?|slips?|misses|mishaps?|setbacks?|hitch(?:es)?)(?: at all| so far| yet| whatsoever| to report| until now| on my record)(?=$|[,.;!])"
         r"|\bnothing(?: i(?:'ve| have)? (?:tried|done|did))? (?:has |have )?(?:so far |yet |ever )?(?:failed|gone wrong|been refused)\b|\bnothing has so far (?:failed|gone wrong)"
         r"|\bi(?:'ve| have) (?:not|never|yet to)(?: once| so far| yet)? (?:failed|fail)(?! to)\b|\bwithout (?:ever |once |a single )?(?:failing|failure|misstep|refusal)\b"
     ),
@@ -149,8 +153,9 @@ CHINESE = ReasonWords(
     ),
     dropped=_all(rf"{_X}[^，。§]{{0,6}}(?:掉到|掉在|掉下|滑落|滑掉|摔到|摔在|落到|脱手)"),
     all_well=re.compile(
-        r"(?:每一步|步步|所有(?:的)?(?:动作|步骤|尝试)|每个动作|每次(?:动作|尝试)?|全程|一路|一切)(?:到目前为止|至今|目前|都|也|很|挺|全|均)*(?:成功|顺利|没(?:有)?(?:失败|失手|出错))"
-        r"|(?:从来|从|至今|到现在|一直|还)?(?:没有?|从没|从未|未曾)(?:一次)?(?:失败|失手|出过(?:什么|任何)?(?:差错|错|问题|岔子|岔))过?(?!的)|没有(?:哪|任何|过)?(?:一)?(?:步|次|回|个动作)(?:失手|失败|出错)|一次(?:都|也)没(?:有)?(?:失败|失手|出错)|都没出(?:过)?(?:岔子|差错|问题)"
+        r"(?:凡是|只要是|但凡)?我?(?:伸手|想|要|试着)?(?:拿|碰|抓|够|试|做)(?:过)?的[^，。]{0,4}(?:没有?(?:一样|一次|一个|哪样|哪次)(?:落空|失手|失败|拿不到|没成)|样样(?:都)?(?:到手|成|拿到|顺利)|(?:全|都|统统)(?:都)?(?:到手|拿到了|成了|成功))|(?:每(?:一)?(?:次|回|趟|样|件))[^，。]{0,6}(?:都|全)(?:拿到|到手|成功|成了|顺利|没(?:有)?(?:落空|失手|失败))|(?:没有?|从没|从未)[^，。§]{0,3}(?:一次|一回|哪次|任何一次)(?:落空|失手|失败|抓空|扑空)|(?:一次|一回)都没(?:有)?(?:落空|失手|失败|抓空|扑空)|百发百中|弹无虚发|无一失手|无一落空|一次没失手"
+        r"|(?:每一步|步步|所有(?:的)?(?:动作|步骤|尝试)|每个动作|每次(?:动作|尝试)?|全程|一路|一切)(?:到目前为止|至今|目前|都|也|很|挺|全|均)*(?:成功|顺利|没(?:有)?(?:失败|失手|出错))"
+        r"|(?:从来|从|至今|到现在|一直|还)?(?:没有?|从没|从未|未曾)(?:一次)?(?:失败|失手|出过(?:什么|任何)?(?:差错|错|问题|岔子|岔))过?(?!的)|没有(?:哪|任何|过)?(?:一)?(?:步|次|回|个动作)(?:失手|失败|出错)|一次(?:都|也)没(?:有)?(?:失败|失手|出错)|(?<!§)(?<!§也)都没出(?:过)?(?:岔子|差错|问题)"
     ),
     except_one=re.compile(r"除|此外|后来|之后|此后|除外|只有|差点|几乎|刚才这|只是"),
     easily=_all(

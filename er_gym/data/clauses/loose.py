@@ -173,7 +173,7 @@ def judge_quotes(thought: Thought) -> Iterator[Verdict]:
     """An answer of the engine is quoted: a refusal, to what never failed."""
     known = thought.known
     for quote in QUOTED.finditer(thought.text):
-        words = quote[1].lower()
+        words = (quote[1] or quote[2]).lower()
         before = thought.text[max(0, quote.start() - 60) : quote.start()].lower()
         own = known.language == "en" and words.startswith("you can")
         if not (own or ANSWERED[known.language].search(before)):

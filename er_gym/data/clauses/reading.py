@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 from er_gym.data.clauses.lexicon import Lexicon, Words
 from er_gym.data.clauses.lexicon_en import LEXICON as ENGLISH
 from er_gym.data.clauses.lexicon_zh import LEXICON as CHINESE
+from er_gym.data.clauses.pronouns import resolved
 from er_gym.data.mentions import Mention
 from er_gym.data.phrases import MARK
 from er_gym.data.reading import Clause
@@ -96,62 +97,6 @@ def clauses_of(thought: Thought) -> Sequence[tuple[Clause, Span]]:
             for each in (*thought.parts, *resolved(thought))
         ]
     return found
-
-
-_STANDS_FOR: Mapping[Language, Words] = {
-    "en": re.compile(
-        r"^(?P<start>(?:and|but|so|no|yes|now|well|,| )*)(?P<it>it|they)(?=\b)"
-        r"|(?<=see )(?P<none>none)(?=$|[,.;!]| (?:anywhere|here|in sight|in view"
-        r"|around|that i can see))"
-        r"|\b(?P<one>(?:of |see |seen |noticed |spotted )(?:one|it))"
-        r"(?=$|[,.;!]| (?:anywhere|since))"
-        r"|\b(?P<only>(?:only|just|no more than|nothing but) (?:one|a single one))"
-        r"(?=$|[,.;!]| (?:around|here|in|to be seen))"
-    ),
-    "zh": re.compile(r"(?P<it>它(?!们|的(?!影|踪)|这|那|里|上))"),
-}
-"""A pronoun for a thing that was named before."""
-
-
-def resolved(thought: Thought) -> Iterator[Clause]:
-    """Clauses that name nothing but speak of the one thing that was named before, with its name."""
-    phrase = _STANDS_FOR[thought.known.language]
-    last: tuple[Mention, ...] = ()
-    named_in_sentence = -1
-    for each in thought.parts:
-        match = phrase.search(each.text)
-        leading = match is not None and match.start() == 0 and match["it"]
-        if each.mentions and leading and len({one.types for one in last}) == 1:
-            assert match is not None
-            body = (match.groupdict().get("start") or "") + MARK + each.text[match.end() :]
-            places = tuple(at for at, letter in enumerate(body) if letter == MARK)
-            if each.sentence - named_in_sentence <= 1:
-                yield replace(each, text=body, mentions=(last[-1], *each.mentions), places=places)
-        if each.mentions:
-            same = named_in_sentence == each.sentence
-            last = (*last, *each.mentions) if same else each.mentions
-            named_in_sentence = each.sentence
-            continue
-        near = each.sentence - named_in_sentence <= 1
-        if match is None or len({one.types for one in last}) != 1 or not near:
-            continue
-        said = match.groupdict()
-        start, pronoun = match.start(), match.group()
-        if said.get("only"):
-            text = f"only one {MARK}"
-        elif said.get("none"):
-            text = f"no {MARK}"
-        elif said.get("one"):
-            text = f"{pronoun.split()[0]} a {MARK}"
-        else:
-            text = f"{said.get('start') or ''}{MARK}"
-        body = each.text[:start] + text + each.text[match.end() :]
-        yield replace(
-            each,
-            text=body,
-            mentions=(last[-1],),
-            places=(body.index(MARK),),
-        )
 
 
 def sentences_of(thought: Thought) -> Sequence[Span]:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from er_gym.data.claims import is_placing, not_on, subjects, told_to_be_on
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, is_told, lexicon_of
 from er_gym.data.mentions import Mention, all_interchangeable
+from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.tasks import verbs
 
@@ -29,18 +30,15 @@ def judge_states(thought: Thought) -> Iterator[Verdict]:
     for clause, span in clauses_of(thought):
         if not is_told(clause) or clause.past or clause.intended:
             continue
-        claims = [
-            (mention, match)
-            for match in span.matches_of((*lexicon.states, *phrases.states), phrases.of_other)
-            if (mention := span.named(match, "x"))
-        ]
         of_it = phrases.it_states.search(clause.text) if clause.it else None
-        if clause.it and of_it:
-            claims.append((clause.it, of_it))
+        claims = [
+            *((span.named(match, "x"), match) for match in _state_matches(thought, clause, span)),
+            *([(clause.it, of_it)] if of_it else ()),
+        ]
         for mention, match in claims:
             before = clause.text[: match.start()]
             none = lexicon.none_of.search(before)
-            if not none and phrases.negation.search(before):
+            if mention is None or (not none and phrases.negation.search(before)):
                 continue
             if _is_to_be(thought, mention, match):
                 continue
@@ -48,11 +46,30 @@ def judge_states(thought: Thought) -> Iterator[Verdict]:
                 continue
             said = match.groupdict()
             word = next((word for word in STATES if said.get(word)), "on")
-            yield _state(thought, span, mention, word, bool(said.get("no")) != bool(none))
+            every = (
+                lexicon.all_of.search(before)
+                or lexicon.all_after.match(clause.text, match.end("x"))
+                if "x" in said
+                else None
+            )
+            yield _state(
+                thought, span, mention, word, bool(said.get("no")) != bool(none), bool(every)
+            )
         poured = lexicon.poured.search(clause.text)
         runs_from = span.named(poured, "x") if poured else None
         if runs_from is not None and not clause.negated:
             yield _state(thought, span, runs_from, "on", False)
+
+
+def _state_matches(thought: Thought, clause: Clause, span: Span) -> Iterator[re.Match[str]]:
+    """Where a clause may say in which state something is."""
+    lexicon, phrases = lexicon_of(thought), thought.phrases
+    yield from span.matches_of((*lexicon.states, *phrases.states), phrases.of_other)
+    if clause.negated or len({each.types for each in span.mentions}) != 1:
+        return
+    for match in span.matches_of(lexicon.loose_states, phrases.of_other):
+        if lexicon.being.search(match["said"]) or lexicon.is_someone.match(match["said"]):
+            yield match
 
 
 def _is_to_be(thought: Thought, mention: Mention, match: re.Match[str]) -> bool:
@@ -65,14 +82,22 @@ def _is_to_be(thought: Thought, mention: Mention, match: re.Match[str]) -> bool:
     )
 
 
-def _state(thought: Thought, span: Span, mention: Mention, word: str, negated: bool) -> Verdict:
-    wrong = is_not(thought, mention, word, negated)
+def _state(
+    thought: Thought, span: Span, mention: Mention, word: str, negated: bool, every: bool = False
+) -> Verdict:
+    wrong = is_not(thought, mention, word, negated, every)
     refusal = Refusal("state", f"{name_of(mention)} {wrong}; say so, or leave it out.")
     return Verdict(span.sentence, refusal if wrong else None)
 
 
-def is_not(thought: Thought, mention: Mention, word: str, negated: bool) -> str:
-    """What is so, if nothing of that name in view is in that state; else ``""``."""
+def is_not(
+    thought: Thought, mention: Mention, word: str, negated: bool, every: bool = False
+) -> str:
+    """What is so, if nothing of that name in view is in that state; else ``""``.
+
+    Args:
+        every: whether all of them must be.
+    """
     wanted, attributes = STATES[word]
     wanted = wanted != negated
     there = [each for _, each in thought.things(mention.types)]
@@ -80,7 +105,11 @@ def is_not(thought: Thought, mention: Mention, word: str, negated: bool) -> str:
         [getattr(each, name) for name in attributes if getattr(each, name) is not None]
         for each in there
     ]
-    if not states or any(not one or wanted in one for one in states):
+    known = [one for one in states if one]
+    fits = all if every and len(known) == len(states) else any
+    if len(known) < len(states) and not (every and known):
+        return ""
+    if not known or fits(wanted in one for one in known):
         return ""
     is_open = there[0].open is not None and "open" in attributes
     words = ("closed", "open") if is_open else ("switched off", "switched on")
