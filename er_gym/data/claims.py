@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+from er_gym.data.clauses.pronouns import resolved
 from er_gym.data.mentions import Mention, all_interchangeable, named_in
 from er_gym.data.phrases import MARK, Phrases
 from er_gym.data.reading import Clause
@@ -141,7 +142,7 @@ def _is_gapped(thought: Thought, clause: Clause, match: re.Match[str]) -> bool:
 
 def check_side(thought: Thought) -> Iterator[Refusal]:
     """Says that an object in view is on another side than it is."""
-    for clause in thought.clauses:
+    for clause in (*thought.clauses, *resolved(thought)):
         if not clause.mentions or clause.guessed or clause.negated or clause.past:
             continue
         for direction, nearly, groups in _sides(clause, thought.phrases):
@@ -154,7 +155,8 @@ def check_side(thought: Thought) -> Iterator[Refusal]:
                 fits = (
                     not places
                     or direction in places
-                    or (mention.types & _WIDE and "ahead" in (*places, direction))
+                    or (mention.types & _WIDE and "ahead" in places)
+                    or (mention.types & _WIDE and direction == "ahead" and {*places} - {"behind"})
                     or (nearly and "ahead" in places)
                     or _bears_there(thought, mention, clause, direction)
                 )
@@ -285,7 +287,7 @@ def not_on(thought: Thought, mention: Mention, holder: Mention) -> str:
     if not there:
         if mention.types & thought.held:
             return "it is in the hand"
-        return ""
+        return not_remembered_on(thought, mention, holder)
     if thought.done(verbs.PUT, holder.types) and thought.done(verbs.PICKUP, mention.types):
         return ""  # another one may be in view
     where = set()
@@ -300,6 +302,24 @@ def not_on(thought: Thought, mention: Mention, holder: Mention) -> str:
             return ""  # what it lies on is out of view
         where.add(f"it is on {each.on}" if each.on else "it does not lie on it")
     return " or ".join(sorted(where))
+
+
+def not_remembered_on(thought: Thought, thing: Mention, place: Mention) -> str:
+    """Where a thing was seen to lie, if never in or on that place; else ``""``."""
+    rested = thought.known.rested
+    if not all("pickupable" in OBJECT_TYPES[each].properties for each in thing.types):
+        return ""
+    if not any("receptacle" in OBJECT_TYPES[each].properties for each in place.types):
+        return ""
+    if thing.types & thought.held:
+        return ""
+    seen = [on for each in all_interchangeable(thing.types) for on in rested.get(each, ())]
+    if not seen or "" in seen:
+        return ""
+    holders = {one for on in seen for one in holders_of(thought, on)}
+    if holders & all_interchangeable(place.types):
+        return ""
+    return f"it was seen on {' and on '.join(dict.fromkeys(seen))}"
 
 
 def _directions(places: Iterable[str]) -> str:

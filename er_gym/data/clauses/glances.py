@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from er_gym.data.claims import holders_of, is_placing
+from er_gym.data.claims import is_placing, not_remembered_on
 from er_gym.data.clauses.lexicon_glances import (
     ANSWERED_NO,
     ASKED_EVER,
@@ -23,10 +23,9 @@ from er_gym.data.clauses.lexicon_glances import (
     VIEW_OF,
 )
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, sentences_of
-from er_gym.data.mentions import Mention, all_interchangeable
+from er_gym.data.mentions import Mention
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
-from er_gym.thor import OBJECT_TYPES
 
 
 def only_thing(mentions: tuple[Mention, ...]) -> Mention | None:
@@ -125,22 +124,9 @@ def judge_lay(thought: Thought) -> Iterator[Verdict]:
                 continue
             wrong = not_remembered_on(thought, thing, place)
             if wrong:
-                yield Verdict(span.sentence, Refusal("memory", wrong))
+                refusal = Refusal(
+                    "memory", f"{name_of(thing)} was not on {name_of(place)}: {wrong}."
+                )
+                yield Verdict(span.sentence, refusal)
             elif thing.types & {*known.rested}:
                 yield Verdict(span.sentence)
-
-
-def not_remembered_on(thought: Thought, thing: Mention, place: Mention) -> str:
-    """Where a thing was seen to lie, if never in or on that place; else ``""``."""
-    rested = thought.known.rested
-    if not all("pickupable" in OBJECT_TYPES[each].properties for each in thing.types):
-        return ""
-    if not any("receptacle" in OBJECT_TYPES[each].properties for each in place.types):
-        return ""
-    seen = [on for each in all_interchangeable(thing.types) for on in rested.get(each, ())]
-    if not seen or "" in seen:
-        return ""
-    holders = {one for on in seen for one in holders_of(thought, on)}
-    if holders & all_interchangeable(place.types):
-        return ""
-    return f"{name_of(thing)} was seen on {' and on '.join(dict.fromkeys(seen))} only."

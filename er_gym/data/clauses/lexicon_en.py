@@ -13,7 +13,7 @@ _NO = (
     "|i|we|it|there|see|has|have|had|which|can|will|was|were|then|so|before|after|until|when|while"
     "|out|up|down|off|over|back|nothing|something|anything|everything|that|where|because|without"
 )
-BEFORE_NAME = _D = r"(?:(?!(?:" + _NO + r") )[a-z0-9'-]+ ){0,3}"
+BEFORE_NAME = _D = r"(?:that (?!i\b|is\b|the\b))?(?:(?!(?:" + _NO + r") )[a-z0-9'-]+ ){0,3}"
 """Articles and adjectives before a name."""
 _OF = r"(?:the (?:lid|door|doors|inside|front|top|side) of )?"
 _XS = rf"(?P<xs>{MARK}(?:(?:,? and,? |,? n?or |, |,? as well as |/){_D}{MARK})*)"
@@ -78,6 +78,9 @@ LEXICON = Lexicon(
         verbs.PICKUP: (
             *_deed(_TOOK, "picking up|taking|grabbing|fetching|collecting|retrieving", "picked up|taken|grabbed|collected|fetched|retrieved"),
             re.compile(rf"(?:{_DONE}) (?:picked|took|taken|lifted|picking|pick) {_D}{_X}(?: right)? (?:up|away|out|along|with me)\b"),
+            re.compile(rf"\bi (?:'ve |have |had )?(?:just |already |even |simply )?(?:lifted|hoisted|nabbed|pocketed|bagged|secured|scooped) {_D}{_X}(?! (?:lid|seat|door))"),
+            re.compile(rf"\b(?:asked|went|reached|lunged|tried|made) (?:out )?for {_D}{_X},? and (?:i )?(?:got|took|have|caught|had|grabbed) (?:it|them|hold)\b"),
+            re.compile(rf"\bi (?:took|had|got|grabbed) (?:one|it|them|two|some)(?: of)? (?:the |these |those )?{_X}\b"),
             re.compile(rf"(?:{_I}) got {_D}{_X}(?=$|[.;]| (?:earlier|before|already|from|out of|off)\b)"),
             re.compile(r"\b(?:managed|was able|did manage) to (?:pick up|take|grab|get hold of|get|fetch|collect) " + _D + _X),
             re.compile(rf"\b(?:grabbing|taking|picking up|getting|fetching|lifting|collecting) (?:hold of )?{_D}{_X} (?:was (?:easy|simple|no (?:trouble|problem|effort)|effortless|a breeze|quick|straightforward|a success)|worked(?! out badly)|went (?:well|fine|smoothly|through|off)|succeeded|posed no)"),
@@ -87,6 +90,7 @@ LEXICON = Lexicon(
             re.compile(rf"\b(?:grab|attempt|try|reach|lunge) (?:at|for) {_D}{_X} (?:went|worked|succeeded|paid off|was a success|came off)(?! wrong| nowhere| out)"),
         ),
         verbs.PUT: (
+            re.compile(rf"\bi (?:just |already |even )?(?:put|set) (?:it|them|{_D}{MARK})(?: back| down| away| safely| off)* {_IN} {_D}{_Y} (?:a (?:second|moment|minute|while|little while) ago|earlier|already|before|just now|at the (?:start|beginning))"),
             re.compile(rf"(?:{_HAVE}) (?:put|set|left) (?:it|them|{_D}{MARK})(?: back| down| away| safely| off)* {_IN} {_D}{_Y}"),
             re.compile(rf"(?:{_DONE}) (?:{_PUT}|putting|placing|dropping) (?:it|them|{_D}{MARK})(?: back| down| away| safely| off)* {_IN} {_D}{_Y}"),
             re.compile(rf"{MARK} (?:has|have|had|is|was)(?: (?:{_ADVERB}))* been (?:{_PUT}|put|set)(?: back| down| away| safely| off)* {_IN} {_D}{_Y}"),
@@ -102,7 +106,7 @@ LEXICON = Lexicon(
         ),
         "searched": (
             *_deed(_SEARCHED, "searching|checking|inspecting|examining|going through|looking (?:in|into|inside|through)|peering into", "searched|checked|examined|inspected|explored|ruled out"),
-            re.compile(rf"\bmy (?:search|inspection|check) of {_D}{_X}"),
+            re.compile(rf"\b(?:my|a|the) (?:[a-z]+ )?(?:search|inspection|check|tour|sweep|survey|examination) of {_D}{_X}(?= (?:already|is over|is done|has|turned|brought|yielded|came|was|gave|earlier|before)|$|[,.;])"),
         ),
     },
     deed_words={
@@ -252,6 +256,12 @@ LEXICON = Lexicon(
     only_then=re.compile(r"\b(?:only|first time|not until|for the first time|first saw|first spotted|first noticed)\b"),
     last_then=re.compile(r"\b(?:last (?:time|saw|seen|spotted|noticed|laid eyes|sight)|last)\b"),
     not_in_view=(
+        re.compile(rf"^(?:the |a |any )?{_XS},? (?:not (?:here|anywhere|in (?:sight|view)|that i (?:can|could) (?:see|tell|make out)|to be seen|around|present|visible|as far as i (?:can )?see)|nowhere\b|absent|is (?:absent|nowhere|not (?:here|around|present|about))|isn't (?:here|around|present|about|anywhere)|there is none|there's none|none here|none at all|gone without a trace)"),
+        re.compile(rf"\b(?:no|not a(?: single)?|not one) {_D}{_XS} (?:is |are |stands |lies |meets |greets |lies )?(?:here|before (?:me|my eyes)|in front of me|around(?: me)?|near me|nearby|about|whatsoever|my eyes?|as far as|that i can (?:see|make out|spot)|in (?:this|the) (?:whole |entire )?(?:room|kitchen|bathroom|bedroom|house|living room|place|picture))(?=$|[,.;!:]| (?:from|to|i|and|so|but|that)\b)"),
+        re.compile(rf"\b(?:(?:kitchen|room|bathroom|bedroom|place|house|living room|view|scene|picture|corner|spot)|this one|it) (?:has|had|have|offers|shows|contains|boasts|comes with) (?:no|not a(?: single)?|not one|neither) {_D}{_XS}(?=$|[,.;!:]| (?:at all|whatsoever|anywhere|to|that)\b)"),
+        re.compile(rf"\b(?:lacks?|lacking|devoid of|without|with no|bare of|free of|short of) (?:a |an |any |so much as a )?{_D}{_XS}(?=$|[,.;!:]| (?:at all|whatsoever|anywhere|that i can see|in sight)\b)(?<=(?:.{{4}}))"),
+        re.compile(rf"\b(?:look|looked|looking|search|searched|searching|scan|scanned)(?: [a-z]+){{0,2}} for (?:a |an |any |the )?{_D}{_XS}(?: here| around)?,? (?:and (?:look|search|find) )?(?:in vain|without success|without luck|to no avail|and find none|and see none)"),
+        re.compile(rf"\bnot (?:a|the) (?:hint|trace|sign|glimpse|shadow|whiff) of (?:a |an |any |the )?{_D}{_XS}"),
         re.compile(rf"\b(?:can't|cannot|can not|don't|do not|couldn't|am unable to|unable to|fail to)(?: (?:yet|currently|even|actually|really|quite))* (?:see|make out|spot|find|notice|detect|discern|pick out|glimpse|identify|locate)(?: (?:a|an|any|the|single|sign|trace|of|glimpse))* {_D}{_XS}(?=$|[,.;!]| (?:anywhere|in (?:this|my|the) (?:view|picture|frame|field|room)|from here|here|at all|in sight|in view|from (?:this|where)|right now|yet|and|or|at the moment|among))"),
         re.compile(rf"\b(?:no|not a(?: single)?|no sign of(?: an?| any| the)?|no trace of(?: an?| any| the)?|nor(?: an?| any)?) {_D}{_XS} (?:within (?:view|sight)|in (?:sight|view|(?:this|my|the) (?:view|picture|frame|scene|field))|to be seen|anywhere|around here|from here|from (?:where|this)|is (?:in (?:sight|view)|visible|to be seen)|visible|can be seen|at all)"),
         re.compile(rf"\b(?:there's|there is|i see|i spot|see) no {_D}{_XS}(?=[,.;!]*$)"),
@@ -306,7 +316,7 @@ LEXICON = Lexicon(
         re.compile(rf"\b(?:fill|fills|crowd|stuff|occupy|occupies|line) {_D}(?:closed |shut |unopened ){_Y}"),
         re.compile(rf"\b(?:i know|i am sure|i'm sure|i'm certain|i am certain|no doubt|certainly|for sure|definitely)\b[^.;?§]{{0,40}}\b(?:behind|inside|within|in) {_D}(?:closed |shut )?{_Y}(?: door| lid)?[^.;?§]{{0,30}}\b(?:there's|there is|there are|sits|lies|is|are|waits)\b"),
         re.compile(rf"{_Y}(?: (?:over|there|here|on|to|my|the|left|right|ahead|in front of me|itself|of mine))*(?: (?:only|just|already|also|clearly|certainly|surely))* (?:holds?|contains?|houses|is (?:completely |totally |quite |half |already |fully |entirely )?(?:full|stuffed|packed|crammed|filled|stocked|loaded|bursting|empty|bare)|are (?:all |completely |totally |quite |already |fully )?(?:full|stuffed|packed|crammed|filled|stocked|loaded|bursting|empty|bare)|hides|conceals|has (?:nothing|a|an|the|some|only|just|plenty|more|enough|room|space)\b[^,.]{{0,30}}(?: (?:in|inside|within) it| inside| waiting| left| free)?)"),
-        re.compile(rf"\b(?:inside|within|in|under) {_D}{_Y}(?: lid)?(?: (?:on|by|in|near|beside|under|to|over)[^,.;]{0,25})?,? (?:there's|there is|there are|sits?|lies?|is|are|waits?|i(?:'ll)? find)\b"),
+        re.compile(rf"\b(?:inside|within|in|under) {_D}{_Y}(?: lid)?(?: (?:on|by|in|near|beside|under|to|over)[^,.;]{{0,25}})?,? (?:there's|there is|there are|sits?|lies?|is|are|waits?|i(?:'ll)? find)\b"),
         re.compile(rf"\b(?:there's|there is|there are) (?:(?!no\b)[a-z-]+ ){{0,3}}(?:{MARK} |nothing |plenty |room |space )?(?:[a-z-]+ ){{0,2}}(?:inside|within|in|under) {_D}{_Y}"),
         re.compile(rf"\b(?:is|are|sits|lies) (?:all |everything )?(?:there is|that is|that's|there's) (?:in|inside) {_D}{_Y}"),
         re.compile(rf"{MARK} (?:is|are|'s|sits|lies|waits|hides)(?: (?:right|sitting|lying|waiting|hidden|hiding|safely|tucked away|already|still))* (?:in|inside|within) {_D}{_Y}"),

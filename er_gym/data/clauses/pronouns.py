@@ -36,8 +36,8 @@ _OF_TOPIC: Mapping[Language, Words] = {
         r"|\b(?P<only>(?:no more than|only|just|but) (?:one|a single one)|a single one)\b"
         r"|\b(?P<one>one|any|anything of the (?:sort|kind))(?= (?:has|have|is|ever|here|around|yet|since|in"
         r"|on|at|before|so far)\b| i\b|$|[,.;!])"
-        r"|\b(?P<it>it|they|them|that one|those)(?!'s (?:a|an|no|time|clear|odd|only)\b| (?:is|was) (?:a|an|no"
-        r"|time|clear|odd|only|just)\b)(?=\b)"
+        r"|\b(?P<it>it|they|them|that one|those)(?!(?:'s| is| was) (?:(?:a|an) (?:pity|shame|relief|good thing|wonder"
+        r"|question|matter|start|chance)|no (?:use|wonder|good|matter)|time|clear|odd|only)\b)(?=\b)"
     ),
     "zh": re.compile(r"(?P<it>它们?|那东西|这东西)(?![这那])"),
 }
@@ -63,6 +63,11 @@ _ONLY_NAMES: Mapping[Language, Words] = {
     ),
 }
 """A sentence that names one thing and says nothing of it."""
+_CALLS: Mapping[Language, Words] = {
+    "en": re.compile(rf"^(?:and |but |now |as for |what about )*(?:the |my |that )?{MARK}:$"),
+    "zh": re.compile(rf"^(?:至于|说到|而|那)?{MARK}(?:呢|嘛|么)[，,]$"),
+}
+"""A clause that does so within a sentence."""
 _REACH = 2
 """So many sentences speak of a topic."""
 
@@ -94,9 +99,10 @@ def resolved(thought: Thought) -> Iterator[Clause]:
             sets = len(kinds) == 1 and (
                 each.asks or (len(whole) == 1 and _ONLY_NAMES[language].match(each.text))
             )
+            sets = sets or (len(each.mentions) == 1 and bool(_CALLS[language].search(each.text)))
             topic = _Topic(each.mentions[-1], each.sentence) if sets else _Topic()
             continue
-        about = 0 < each.sentence - topic.sentence <= _REACH
+        about = 0 <= each.sentence - topic.sentence <= _REACH
         if about and topic.mention and not each.asks:
             match = _OF_TOPIC[language].search(each.text)
             if match:

@@ -11,6 +11,7 @@ from er_gym.data.mentions import Mention, all_interchangeable
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.tasks import verbs
+from er_gym.thor import OBJECT_TYPES
 
 STATES: Mapping[str, tuple[bool, tuple[str, ...]]] = {
     "open": (True, ("open",)),
@@ -100,7 +101,12 @@ def is_not(
     """
     wanted, attributes = STATES[word]
     wanted = wanted != negated
-    there = [each for _, each in thought.things(mention.types)]
+    there = [
+        each
+        for _, each in thought.things(mention.types)
+        if len(mention.types) == 1
+        or {"openable", "toggleable"} & OBJECT_TYPES[each.type].properties
+    ]
     states = [
         [getattr(each, name) for name in attributes if getattr(each, name) is not None]
         for each in there
