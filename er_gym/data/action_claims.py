@@ -167,7 +167,12 @@ def check_decision(thought: Thought) -> Iterator[Refusal]:
         if (each.act != "look around" or each.clause.last) and not _is_coming_job(thought, each)
     ]
     fitting = [each for each in those if _fits(thought, each)]
-    others = [each for each in those if each not in fitting and not each.later]
+    over = known.decision.verb == verbs.END
+    others = [
+        each
+        for each in those
+        if each not in fitting and not (each.later and not (over and _is_next(each)))
+    ]
     wrong = None
     if those and not fitting:
         strong = [each for each in others if not each.weak]
@@ -195,6 +200,12 @@ def check_decision(thought: Thought) -> Iterator[Refusal]:
                 yield Refusal(
                     "decision", f"The task is not done: the next action is {known.decision}."
                 )
+
+
+def _is_next(decided: Decided) -> bool:
+    """Whether it is to follow for certain: after the end, nothing does."""
+    clause = decided.clause
+    return not (clause.conditional or clause.negated or clause.hedged or clause.past)
 
 
 def decided(thought: Thought) -> Iterator[Decided]:
@@ -260,6 +271,8 @@ def _fits(thought: Thought, decided: Decided) -> bool:
     if act in ("look around", "end"):
         return False
     if act == "forward":
+        return verb == verbs.NAVIGATE
+    if act == "go" and decided.thing is None:
         return verb == verbs.NAVIGATE
     if act in ("go", "visit"):
         return same and verb in (verbs.NAVIGATE, verbs.OPEN, verbs.PICKUP, verbs.TOGGLE)

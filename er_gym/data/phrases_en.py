@@ -290,7 +290,7 @@ PHRASES = Phrases(
         "look around": re.compile(
             r"(?:stop and )?(?:observe\b(?! (?:the|that|how|what) §)|(?:look|glance|take a (?:good |quick |full )?look|have a look|turn)(?: all)? (?:around|about|round)\b(?! §)|(?:scan|observe|survey|view)(?: the| my| this)?(?: whole| entire| rest of the)? (?:room|surroundings|area|kitchen|bathroom|bedroom|living room|scene))"
         ),
-        "go": _act(_GO + "/to/over/on/back/across/straight/up", rf"(?:(?:back|over|straight|right|directly|on|up|across|down|now|out|first|to|towards?|for|near|off|close) )+{_D}{_X}"),
+        "go": _act(_GO + "/to/over/on/back/across/straight/up", rf"(?:(?:(?:back|over|straight|right|directly|on|up|across|down|now|out|first|to|towards?|for|near|off|close) )+{_D}{_X}|(?:back |over |across |straight |right |up )*there\b)"),
         "visit": _act("approach/visit/try/return to/make for", _AND_SO),
         "check": _act(
             "check/search/inspect/examine/investigate/explore/look/peek/take a look/take a closer look/have a look/have a closer look/see what is/rummage",

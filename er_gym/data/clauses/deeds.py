@@ -236,11 +236,15 @@ def judge_answers(thought: Thought) -> Iterator[Verdict]:
         if told is None or any(each.asks for each in span.clauses):
             continue
         said = [why for why, each in lexicon.answers.items() if each.search(span.text)]
-        if not said:
+        if not said or lexicon.undone.search(
+            span.text, max(0, told.start() - _ROUND), told.end() + _ROUND // 2
+        ):
             continue
         meant = _meant(thought, span, told.start())
-        if meant is None:
+        if meant is None and "done" in said:
             continue
+        if meant is None:
+            meant = [*actions]
         if not meant:
             if span.mentions:
                 yield Verdict(
@@ -261,6 +265,8 @@ def judge_answers(thought: Thought) -> Iterator[Verdict]:
         )
 
 
+_ROUND = 12
+"""Letters before an answer in which it is denied."""
 _ENDED = re.compile(r"[.。]")
 
 

@@ -35,7 +35,7 @@ HAND = _words(
 )
 TAKEN = _words(
     r"\b(?:picked|took|taken|grabbed|got|gotten|fetched|collected|retrieved|snatched|scooped|seized"
-    r"|lifted|plucked|pocketed|secured|bagged|nabbed)\b|\bup (?:it|they) (?:went|came)\b|\bcame (?:up|away)\b",
+    r"|lifted|plucked|pocketed|secured|bagged|nabbed|mine|gave in|yielded|obliged|surrendered|let (?:itself|themselves) be (?:taken|picked up|lifted)|jumped into|came to hand|came quietly)\b|\bup (?:it|they) (?:went|came)\b|\bcame (?:up|away)\b",
     r"(?:拿|取|捡|抓|拾|拎|端|捞|掏|抽|摸|揣|夹)(?:[^，。；§]{0,4})?(?:了|过|到|起|走|出|下来|上来)|到手|入手|拿下|一[拿抓取捡够]就",
 )
 SELF = _words(
@@ -76,6 +76,21 @@ ANSWERED = _words(
     r"\b(?:said|told|says|answer|message|reply|replied|feedback|system|response|it)\b|^[\"“]you can",
     r"提示|系统|反馈|回复|回答|消息|说",
 )
+ANSWERED_AFTER = _words(
+    r"^[.,!]?[\"”]?,? ?(?:came|was|is|that's|that is|it|the|said|says|they|i was told|so|:|read|read back|they say|according)?[^.;]{0,25}\b(?:said|says|answer|message|reply|replied|feedback|system|response|objected|told|protested|read|came back|verdict|complained|insisted)\b",
+    r"^[，。]?(?:这是|是|系统|它|就是)?[^。]{0,10}(?:提示|系统|反馈|回复|回答|消息|说|报错|答复)",
+)
+KINDS_OF_ANSWERS = (
+    re.compile(
+        r"already hold|hold [^.]{0,20}already|hand(?:s)? (?:is|are) (?:already )?full|put it down first|手里已经拿|手里已有|手里拿着|先放下"
+    ),
+    re.compile(r"within reach|close enough|too far|out of reach|够得着|够不|太远|足够近"),
+    re.compile(r"hand is empty|hands are empty|nothing in (?:my|your) hand|手里是空|手是空|两手空"),
+    re.compile(
+        r"names no action|no such action|unknown (?:action|command)|invalid|not an action|不是一个动作|无效|未知动作"
+    ),
+)
+"""Kinds of the engine's answers, in both languages: one that was never given cannot be quoted."""
 REFUSES = _words(
     r"\b(?:cannot|can't|not|no|none|unable|failed|jammed|locked|stuck|denied|refused|too)\b",
     r"无法|不能|没有|不|未|失败|上锁|锁|太|拒绝",

@@ -12,11 +12,14 @@ from collections.abc import Iterator
 
 from er_gym.data.action_claims import has_done
 from er_gym.data.claims import is_placing, not_on
+from er_gym.data.clauses.lexicon_beyond import NEVER_ANSWERED
 from er_gym.data.clauses.lexicon_loose import (
     ANSWERED,
+    ANSWERED_AFTER,
     EASE,
     FIRST,
     HAND,
+    KINDS_OF_ANSWERS,
     LIES,
     ON_IT,
     OVER,
@@ -170,15 +173,29 @@ def _first_named(instruction: str) -> frozenset[str]:
 
 
 def judge_quotes(thought: Thought) -> Iterator[Verdict]:
-    """An answer of the engine is quoted: a refusal, to what never failed."""
-    known = thought.known
-    for quote in QUOTED.finditer(thought.text):
+    """An answer of the engine is quoted: a refusal, to what never failed, or one that it never
+    gave."""
+    known, text = thought.known, thought.text
+    for quote in QUOTED.finditer(text):
         words = (quote[1] or quote[2]).lower()
-        before = thought.text[max(0, quote.start() - 60) : quote.start()].lower()
+        before = text[max(0, quote.start() - 60) : quote.start()].lower()
+        after = text[quote.end() : quote.end() + 40].lower()
         own = known.language == "en" and words.startswith("you can")
+        alone = not before.strip() or before.rstrip().endswith((".", "!", "?", "。", "！", "？"))
+        said = ANSWERED[known.language].search(before) or ANSWERED_AFTER[known.language].search(
+            after
+        )
+        if not known.actions or not (own or said or alone) or words in known.instruction.lower():
+            continue
+        if lexicon_of(thought).undone.search(before[-25:]):
+            continue
+        number = text[: quote.start()].count(".") if known.language == "en" else 0
+        wrong = _never_answered(thought, words)
+        if wrong:
+            yield Verdict(min(number, len(thought.clauses) - 1), Refusal("history", wrong))
         if not (own or ANSWERED[known.language].search(before)):
             continue
-        if not known.actions or not REFUSES[known.language].search(words):
+        if not REFUSES[known.language].search(words):
             continue
         near = [each for each in thought.clauses if each.mentions]
         types = all_interchangeable(
@@ -189,6 +206,18 @@ def judge_quotes(thought: Thought) -> Iterator[Verdict]:
             last = meant[-1]
             detail = f"The answer to {last.action} was: {last.feedback.split('.')[0]}."
             yield Verdict(near[0].sentence, Refusal("history", detail))
+
+
+def _never_answered(thought: Thought, words: str) -> str:
+    """Why the engine cannot have said that, or ``""``."""
+    answers = " ".join(each.feedback for each in thought.known.actions).lower()
+    reason = NEVER_ANSWERED[thought.known.language].search(words)
+    if reason and reason.group() not in answers:
+        return f"No answer spoke of “{reason.group()}”."
+    for kind in KINDS_OF_ANSWERS:
+        if kind.search(words) and not kind.search(answers):
+            return "No answer said that."
+    return ""
 
 
 def _own(thought: Thought) -> list[str]:

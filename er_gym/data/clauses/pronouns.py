@@ -30,6 +30,16 @@ _STANDS_FOR: Mapping[Language, Words] = {
     "zh": re.compile(r"(?P<it>它(?!们|的(?!影|踪)|这|那|里|上))"),
 }
 """A pronoun for a thing that was named before."""
+_AS_OBJECT: Mapping[Language, Words] = {
+    "en": re.compile(
+        r"(?<=[a-z] )(?P<it>it|them|that one)(?=$|[,.;!?]| (?:in|on|up|down|into|from|out|off|with|to|back|away|now|yet|and"
+        r"|at|for|over|open|shut|closed|firmly|tight|tightly|safely|already|as|so|since|before|while)\b)"
+    ),
+    "zh": re.compile(r"(?!)"),
+}
+"""The same in the middle of a clause."""
+_MOST = 3
+"""So many things a pronoun may stand for: what is said must be false of each."""
 _OF_TOPIC: Mapping[Language, Words] = {
     "en": re.compile(
         r"\b(?P<none>none|nothing of the (?:sort|kind)|nowhere|no such thing)\b"
@@ -87,11 +97,11 @@ def resolved(thought: Thought) -> Iterator[Clause]:
     topic = _Topic()
     for each in thought.parts:
         near = each.sentence - named_in <= 1
-        one = len({mention.types for mention in last}) == 1
         if each.mentions:
             match = _STANDS_FOR[language].search(each.text)
-            if match and match.start() == 0 and match["it"] and one and near:
-                yield _with(each, last[-1], match)
+            before = _meant(last)
+            if match and match.start() == 0 and match["it"] and before and near:
+                yield _with(each, before, match)
             last = (*last, *each.mentions) if named_in == each.sentence else each.mentions
             named_in = each.sentence
             whole = [one for one in thought.parts if one.sentence == each.sentence]
@@ -110,9 +120,21 @@ def resolved(thought: Thought) -> Iterator[Clause]:
             elif _NO_SUBJECT[language].match(each.text):
                 yield _named(each, topic.mention, MARK + " " * (language == "en") + each.text)
             continue
-        match = _STANDS_FOR[language].search(each.text)
-        if match is not None and one and near:
-            yield _with(each, last[-1], match)
+        match = _STANDS_FOR[language].search(each.text) or _AS_OBJECT[language].search(each.text)
+        before = _meant(last)
+        if match is not None and before and near:
+            yield _with(each, before, match)
+
+
+def _meant(last: tuple[Mention, ...]) -> Mention | None:
+    """What a pronoun stands for: one thing, or one of a few."""
+    kinds = {mention.types for mention in last}
+    if not kinds or len(kinds) > _MOST:
+        return None
+    if len(kinds) == 1:
+        return last[-1]
+    text = "/".join(dict.fromkeys(mention.text for mention in last))
+    return replace(last[-1], text=text, types=frozenset().union(*kinds))
 
 
 def _with(each: Clause, mention: Mention, match: re.Match[str]) -> Clause:
