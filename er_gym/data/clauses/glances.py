@@ -81,7 +81,7 @@ def judge_never_loosely(thought: Thought) -> Iterator[Verdict]:
             continue
         if any(each.hedged for each in span.clauses) or not PERCEIVED[language].search(span.text):
             continue
-        text = SINCE_START.sub(" ", span.text) if language == "en" else span.text
+        text = SINCE_START[language].sub(" ", span.text)
         if NEVER[language].search(span.text) and not LIMITS[language].search(text):
             yield _unseen_so_far(thought, span.sentence, mention)
     sentences = sentences_of(thought)
@@ -94,7 +94,7 @@ def judge_never_loosely(thought: Thought) -> Iterator[Verdict]:
         ):
             continue
         if ANSWERED_NO[language].search(answer.text) and not answer.mentions:
-            text = SINCE_START.sub(" ", asked.text)
+            text = SINCE_START[language].sub(" ", asked.text)
             if not LIMITS[language].search(text):
                 yield _unseen_so_far(thought, answer.sentence, mention)
 

@@ -37,6 +37,7 @@ class Lexicon:
         answers: what it was, by reason.
         task: the task is quoted; what follows is what it asks for.
         chores: what a task may ask for, by the words that the instruction then has.
+        goes_into: in that: something is to go into ``y``.
         rooms: the kinds of rooms.
         any_room: without which no room is named.
         room_in_general: a room is named, but not as this one.
@@ -61,6 +62,7 @@ class Lexicon:
         not_in_view: none of ``xs`` is in view.
         not_on: ``x`` is not on ``y``, which is in view.
         perhaps_on: ``x`` is in or on ``y``, after a guess.
+        of_memory: what was seen is spoken of.
         another: not the thing that is known.
         seeing_now: what is seen now is ``x``.
         beside: ``x`` is next to ``y``.
@@ -97,6 +99,7 @@ class Lexicon:
     answers: Mapping[str, Words]
     task: Words
     chores: Mapping[str, tuple[Words, Words]]
+    goes_into: Words
     rooms: Mapping[str, Words]
     any_room: Words
     room_in_general: Words
@@ -122,6 +125,7 @@ class Lexicon:
     not_in_view: Sequence[Words]
     not_on: Sequence[Words]
     perhaps_on: Sequence[Words]
+    of_memory: Words
     another: Words
     seeing_now: Sequence[Words]
     beside: Sequence[Words]

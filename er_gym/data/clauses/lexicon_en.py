@@ -131,7 +131,7 @@ LEXICON = Lexicon(
         )
     },
     first_try=re.compile(r"\b(?:at|on|with) (?:the|my) (?:very )?first (?:try|attempt|go|grab|shot)|\bfirst time round|\bfirst (?:try|attempt|grab) (?:worked|succeeded|went)|\b(?:straight off|in one go|at once|without a hitch)\b"),
-    undone=re.compile(r"\b(?:never|not|nothing|without|neither|nor|none|no|yet to|failed|unable)\b|n't\b"),
+    undone=re.compile(r"\b(?:nobody|no one|never|not|nothing|without|neither|nor|none|no|yet to|failed|unable)\b|n't\b"),
     unwilling=re.compile(r"\b(?:cannot|can't|rather than|instead of|tried to|meant to|wanted to|needn't|about to)\b"),
     once_more=re.compile(r"\b(?:back|again|off|twice|a second time|properly|fully|quite|thoroughly|either of)\b"),
     nothing={
@@ -183,6 +183,8 @@ LEXICON = Lexicon(
     },
     task=re.compile(r"\b(?:(?:was|am|been|i'm|i've been|being) (?:only |specifically |explicitly )?(?:asked|told|instructed|ordered|requested|sent)(?: here)? (?:to|for)|(?:task|job|instruction|instructions|request|order|errand|mission|assignment|brief)(?: (?:is|was|says|said|wants me|tells me|told me|asks me|requires me|demands|calls for|only says)| here is)*(?: to| for| that)?(?= (?!done|over|complete|finished))|(?:is|are) (?:supposed|meant) to(?! be (?:in|on|at|here|there|under|inside))(?: be)?|they (?:want|asked)(?: me)?(?: to)?|asked me to|wants me to)"),
     chores={
+        "put": (re.compile(r"\b(?:put|place|drop|deposit|stow|store|deliver|leave|lay|set|move|bring|carry|take) (?:it|them|this|the §|a §|that §|§|both)?[^.;]{0,20}?\b(?:in|into|on|onto|inside|to|down|back)(?= (?:the |a |this |that |its )?(?:[a-z]+ )?§)"), re.compile(r"put|plac|drop|mov|bring|carr|set\b|store|throw|leave|deliver|deposit|stow|return|back|into|onto|belongs|放|摆|搁|送|移|收", re.I)),
+        "take": (re.compile(r"\b(?:pick (?:it |them |the § |§ )?up|grab|pocket|get hold of|collect|hold)\b"), re.compile(r"pick|tak|grab|hold|hand|fetch|get\b|bring|put|plac|mov|carr|collect|lift|drop|slic|heat|cool|clean|wash|chill|throw|store|拿|取|放|捡|搁", re.I)),
         "heat": (re.compile(r"\b(?:heat(?:ed|ing)?|warm(?:ed|ing)?|cook(?:ed|ing)?|boil(?:ed)?|fry|fried|toast(?:ed)?|bake[d]?|roast(?:ed)?|microwaved)\b"), re.compile(r"heat|warm|cook|boil|fry|toast|bake|roast|\bhot\b|热|煮|烤|煎|加热", re.I)),
         "use": (re.compile(r"\b(?:play|read|eat|drink|watch|charge|fold|repair|fix|paint|feed|water|iron|decorate|serve|sharpen|unplug|plug in|measure|count|photograph|smell|taste)\b"), re.compile(r"play|read\b|eat|drink|watch|charg|fold|repair|fix|paint|feed|water|iron|decorat|serv|sharpen|plug|measur|count", re.I)),
         "wash": (re.compile(r"\b(?:wash(?:ed|ing)?|clean(?:ed|ing)?|rins(?:e|ed|ing)|scrub(?:bed)?|wipe[d]?|polish(?:ed)?)\b"), re.compile(r"wash|clean|rins|scrub|wipe|dirty|water|洗|清|擦", re.I)),
@@ -194,6 +196,7 @@ LEXICON = Lexicon(
         "throw": (re.compile(r"\b(?:thrown? (?:away|out|in)|discard(?:ed)?|dispose|bin it)\b"), re.compile(r"throw|discard|dispos|garbage|bin|trash|扔|丢|垃圾", re.I)),
         "switch": (re.compile(r"\b(?:switch(?:ed)?|turn(?:ed)?) (?:it |them |§ )?(?:on|off)\b"), re.compile(r"switch|turn|light|lamp|toggle|\bon\b|\boff\b|power|lit|dark|run|开|关", re.I)),
     },
+    goes_into=re.compile(rf"\b(?:put|place|drop|deposit|stow|store|deliver|leave|lay|set|move|bring|carry|take|get|go|goes|throw|thrown|moved|brought|carried)\b[^.;]{{0,30}}?\b(?:in|into|on|onto|inside|to|on top of|over to) {_D}{_Y}"),
     rooms={
         "kitchen": re.compile(r"\b(?:kitchen|kitchenette|pantry|galley)\b(?! §)"),
         "bathroom": re.compile(r"\b(?:bathroom|washroom|restroom|lavatory|shower room)\b(?! §)"),
@@ -277,8 +280,11 @@ LEXICON = Lexicon(
         re.compile(rf"\b(?:no|not a|not a single|without a|isn't a|is not a|isn't any|see no) {_D}{_X} (?:on|in|inside|on top of) {_D}{_Y}"),
     ),
     perhaps_on=(
+        re.compile(rf"{_Y} (?:may|might|could|must|probably|perhaps|possibly|surely)(?: (?:well|also|just|be|have|still))* (?:has|have|hold|holds|hide|hides|hiding|holding|contain|contains|conceal|house) (?:one|it|them|{_D}{_X})"),
+        re.compile(rf"(?:perhaps|maybe|possibly|probably) {_D}{_Y} (?:has|holds|hides|contains|conceals|houses) {_D}{_X}"),
         re.compile(rf"{_X},?[^§,]{{0,45}}?\b(?:in|inside|on|on top of|under|behind|near|by|beside|over by|into|over at|at)\b (?:one of |some |any )?{_D}{_Y}"),
     ),
+    of_memory=re.compile(r"\b(?:saw|seen|noticed|spotted|remember|recall|was|were|still|earlier|had|left|put|back|before|same|glimpsed)\b"),
     another=re.compile(r"\b(?:another|second|more|other|else|spare|third|further|extra|also)\b"),
     seeing_now=(
         re.compile(rf"\bi (?:can )?(?:(?:clearly|now|also|still|already|even|just) )*(?:see|make out|spot)(?: that| both| now| already)? {_D}{_X}(?! (?:in my mind|being))"),

@@ -74,18 +74,19 @@ PERCEIVED = _words(
 )
 """A thing is seen, or comes into view."""
 NEVER = _words(
-    r"\bnever\b|\byet to\b|\b(?:have|has|had|'ve)(?: (?:yet|still|so far))? (?:not|n't)\b|\b(?:haven't|hasn't|hadn't)\b|\bnot (?:once|one|a single|at any point|ever|even once|so much)\b"
+    rf"\bnever\b|\byet to\b|\bnot an? {MARK} (?:have|has|did)\b|\b(?:have|has|had|'ve)(?: (?:yet|still|so far))? (?:not|n't)\b|\b(?:haven't|hasn't|hadn't)\b|\bnot (?:once|one|a single|at any point|ever|even once|so much)\b"
     r"|\b(?:can't|cannot|couldn't|don't|wouldn't|didn't|did not|do not) (?:[a-z']+ ){0,6}ever\b|\bno [^,.]{0,25}\bever\b|\b(?:doubt|deny)\b[^,.]{0,30}\bever\b"
     r"|\bnot [^,.]{0,30}\b(?:so far|all this time|since i (?:came|walked|entered|arrived|started|got))\b|\bno (?:sight|glimpse|sign|trace) of\b[^,.]{0,30}\b(?:so far|yet|all this time|until now|to date)\b"
     r"|\b(?:has|have|remains?|stayed|kept)\b[^,.]{0,15}\b(?:unseen|hidden from me|out of my sight)\b",
     r"(?:从来|从|至今|到现在|到目前|目前为止|始终|一直|一次|一眼|一回|压根|根本|从头到尾|一路|迄今|到这会儿|进来以后|自始至终)[^，。]{0,10}(?:没|未|不曾|没有)|(?:没|没有|未|不曾)(?:有)?[^，。]{0,5}过|毫无印象|没有?(?:半点|一点|任何)?印象|还没[^，。]{0,4}(?:见|看|露|出现|遇|碰)",
 )
 """Ever since the beginning, not once."""
-SINCE_START = re.compile(
-    r"\bsince (?:i (?:first )?(?:came|walked|entered|arrived|started|began|got|set foot)|(?:walking|coming|arriving|entering|getting|setting foot))(?: (?:in|into|through|here|to|this|the)\b)+(?: (?:room|door|place|kitchen|bathroom|bedroom|house|living room))?"
-    r"|\bin (?:this|the) (?:room|place|kitchen|bathroom|bedroom|house|living room)\b|\bso far\b|\byet\b|\bin here\b|\bup to now\b|\buntil now\b"
+SINCE_START = _words(
+    r"\bsince(?:$| (?:i (?:first )?(?:came|walked|entered|arrived|started|began|got|set foot)|(?:walking|coming|arriving|entering|getting|setting foot))(?: (?:in|into|through|here|to|this|the)\b)*(?: (?:room|door|place|kitchen|bathroom|bedroom|house|living room))?)"
+    r"|\b(?:in|around) (?:this|the) (?:room|place|kitchen|bathroom|bedroom|house|living room)\b|\bso far\b|\byet\b|\bin here\b|\bup to now\b|\buntil now\b|\bto this (?:moment|day|minute)\b|\bup to this (?:moment|minute)\b",
+    r"(?:从|自从|打)?(?:我)?(?:进|走进|来到|来)(?:了)?(?:这|这个|这间)?(?:门|屋|屋子|房间|厨房|浴室|卧室|客厅|这里|这儿)?(?:以来|以后|之后|后|起)?(?:一直)?(?:到现在|到这会儿|至今|以来)|到(?:现在|目前|此刻|这会儿)(?:为止)?|(?:直到|直至)(?:现在|目前|此刻)|(?:在)?这(?:个|间)?(?:房间|厨房|浴室|卧室|客厅|屋子?)(?:里)?|迄今(?:为止)?",
 )
-"""English: a time or place that limits nothing."""
+"""A time or place that limits nothing."""
 LIMITS = _words(
     rf"\b(?:from here|now|in this view|this time|at the moment|currently|right now|since|again|any ?more|up close|clearly|properly|lately|from this|inside it|closely|in it|on it|whole"
     rf"|other|another|else|second|more|open|opened|closed|used|move|moved|empty|near|nearer|like|such|so (?:close|clean|many)|from)\b|\b(?:in|on|inside|at|by|under|behind|near|with|of (?:the|this|that)) (?:the |this |that |any |my |a )?(?:[a-z-]+ )?{MARK}",

@@ -111,7 +111,7 @@ LEXICON = Lexicon(
         )
     },
     first_try=re.compile(r"第一(?:次|回|下)就|一次(?:就)?(?:成功|拿到)|一下子就|头一(?:次|回)就|一把就"),
-    undone=re.compile(r"没|未|不曾|没能|还没"),
+    undone=re.compile(r"没|谁也|未|不曾|没能|还没"),
     unwilling=re.compile(r"别|不用|不必|不能|不是|不想|无法|想|本来|差点|打算"),
     once_more=re.compile(r"再|又|重新|回来|第二次|关掉|关上|仔细|认真"),
     nothing={
@@ -153,6 +153,8 @@ LEXICON = Lexicon(
     },
     task=re.compile(r"(?:任务|题目|题|指令|要求|差事|活儿|吩咐)(?:只|就|本来|原本|明明|的?内容|里)*(?:是让我|是要我|是让|是要|是叫我|要求我|要求|让我|让|要我|叫我|叫|说要|说|写的是|里写的是|规定|就是|是)(?:去)?(?:把|将)?|(?:被|有人|人家|他们|对方)(?:要求|让我|叫我|要我|吩咐我|派来)(?:去)?(?:把|将)?"),
     chores={
+        "put": (re.compile(r"(?:放|搁|送|挂|摆|塞|装|收|移|搬)(?:进|到|在|入|回|去)(?=[^，。；]{0,5}§)"), re.compile(r"put|plac|drop|mov|bring|carr|set\b|store|throw|leave|deliver|deposit|stow|return|back|into|onto|belongs|放|摆|搁|送|移|收", re.I)),
+        "take": (re.compile(r"拿起来|捡起|拿在手|拿到手|抱起|取走|拿走"), re.compile(r"pick|tak|grab|hold|hand|fetch|get\b|bring|put|plac|mov|carr|collect|lift|drop|slic|heat|cool|clean|wash|chill|throw|store|拿|取|放|捡|搁", re.I)),
         "heat": (re.compile(r"加热|热好|热一下|煮|烤(?!面包机)|煎|炒|蒸|热热"), re.compile(r"heat|warm|cook|boil|fry|toast|bake|roast|\bhot\b|热|煮|烤|煎", re.I)),
         "use": (re.compile(r"播放|阅读|读(?!数)|吃|喝(?!水)|充电|修理|修好|叠好|喂|浇水|熨|装饰|摆盘|称重"), re.compile(r"play|read\b|eat|drink|charg|repair|fix|fold|feed|water|iron|decorat|播|读|吃|喝|充|修|叠|喂|浇", re.I)),
         "wash": (re.compile(r"洗(?!手液|手池|碗|衣|脸|洁)|清洗|清洁|擦|冲洗|打扫|刷(?!子)"), re.compile(r"wash|clean|rins|scrub|wipe|dirty|water|洗|清|擦", re.I)),
@@ -162,6 +164,7 @@ LEXICON = Lexicon(
         "break": (re.compile(r"打碎|砸|打破|敲碎"), re.compile(r"break|broke|smash|crack|打碎|打破", re.I)),
         "throw": (re.compile(r"扔|丢掉|丢进|倒掉|丢弃"), re.compile(r"throw|discard|dispos|garbage|bin|trash|扔|丢|垃圾", re.I)),
     },
+    goes_into=re.compile(rf"(?:放|搁|送|挂|摆|塞|装|收|移|搬|丢|扔|拿|留)(?:进|到|在|入|回)(?:去)?{_D}{_Y}"),
     rooms={
         "kitchen": re.compile(r"厨房(?![用纸的]?§)|灶间|灶房"),
         "bathroom": re.compile(r"浴室|卫生间|洗手间|盥洗室|洗澡间|厕所"),
@@ -239,6 +242,7 @@ LEXICON = Lexicon(
         re.compile(rf"{_X}[^，。；§]{{0,14}}(?:在|进|到|于|躲|收在|藏在){_D}(?:哪个|某个|哪一个|哪|某)?{_Y}"),
         re.compile(rf"{_Y}(?:的)?(?:里面?|上面?|中)(?:可能|也许|大概|或许|说不定|没准|多半|估计|应该)*(?:有|放着|藏着|收着|会有|能找到){_D}{_X}"),
     ),
+    of_memory=re.compile(r"见过|看到过|看见过|记得|刚才|之前|原来|还在|仍|当时|先前"),
     another=re.compile(r"另|第二|还有|别的|其他|其它|多余|再(?:有|来)|更多|备用"),
     seeing_now=(
         re.compile(rf"(?:我)?(?:现在|这会儿|此刻|清楚地|正|能|可以|都能|就|从这里|从这儿)+(?:能)?(?:看到|看见|瞧见|看得到|看得见|望见){_D}{_X}(?!之前|的时候)"),

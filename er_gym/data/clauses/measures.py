@@ -200,6 +200,13 @@ def judge_tasks(thought: Thought) -> Iterator[Verdict]:
                 continue
             mention = span.first(match.end(), match.end() + len(rest))
             wrong = mention is not None and not mention.types & asked
+            goal = lexicon.goes_into.search(rest)
+            place = (
+                span.first(match.end() + goal.start("y"), match.end() + goal.end("y"))
+                if goal
+                else None
+            )
+            wrong = wrong or (place is not None and not place.types & asked)
             chore = next(
                 (
                     said.group()

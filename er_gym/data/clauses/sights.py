@@ -166,7 +166,7 @@ def judge_guesses(thought: Thought) -> Iterator[Verdict]:
                 continue
             if is_placing(clause, match.start("x"), thought.phrases):
                 continue
-            if not mention.types & thought.in_view:
+            if not mention.types & thought.seen or lexicon.of_memory.search(span.text):
                 continue
             wrong = not_on(thought, mention, holder)
             if wrong:
@@ -174,7 +174,7 @@ def judge_guesses(thought: Thought) -> Iterator[Verdict]:
                     span.sentence,
                     Refusal(
                         "memory",
-                        f"{name_of(mention)} is in view, and {wrong}: do not guess where it is.",
+                        f"{name_of(mention)} was seen, and {wrong}: do not guess where it is.",
                     ),
                 )
 
