@@ -230,7 +230,9 @@ def decided(thought: Thought) -> Iterator[Decided]:
                 groups = {"x", "x2"} & match.re.groupindex.keys()
                 at = max((match.start(group) for group in groups), default=-1)
                 if at >= 0:
-                    thing = next(iter(clause.among(at + offset, at + offset + 1)), None)
+                    inner = _INNER.match(body, at)
+                    last = inner.end() - 1 if inner else at
+                    thing = next(iter(clause.among(last + offset, last + offset + 1)), None)
                 before = clause.text[: start.end()] + (skipped.group() if skipped else "")
                 yield Decided(
                     act,
@@ -244,6 +246,10 @@ def decided(thought: Thought) -> Iterator[Decided]:
                     or bool(phrases.later.match(body[match.end() :].lstrip(" ,"))),
                 )
                 break
+
+
+_INNER = re.compile(r"§(?:上|里|旁边?|边上|前面?|后面?|下面?)(?:的|那|这)[^，。§]{0,4}§")
+"""Chinese: "the laptop on the table", whose own name stands last."""
 
 
 def _unmasked(text: str, clause: Clause, offset: int) -> str:

@@ -26,6 +26,7 @@ class Phrases:
         verb: what makes a clause a clause: without it, it belongs to the one before.
         aside: a relative clause between a subject and its verb.
         question: a sentence that asks.
+        asking: in such a sentence, a clause from which on it asks; the last one asks in any case.
         hedge, negation, condition, goal, custom, past, intention: marks of clauses that claim
             something else than what is so now: what may be, what is not, what would be, what is
             wanted, what is usual, what was, what the agent is going to do.
@@ -63,6 +64,7 @@ class Phrases:
     verb: Phrase
     aside: Phrase
     question: Phrase
+    asking: Phrase
     hedge: Phrase
     negation: Phrase
     condition: Phrase

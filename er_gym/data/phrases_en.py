@@ -77,19 +77,22 @@ PHRASES = Phrases(
         r",\s+(?!which (?:is|are|sits|stands|lies|rests|i have|i've|i already)\b)(?:(?:and|but|so|which|while|yet|then|though|although|because|since|where|as)\s+)?",
         r":\s+",
         r"\s+[—–-]\s+|—",
-        r"\s(?:but|while|because|since|although|though|so that|so|whereas|yet|then)\s",
+        r"\s(?:but|while|because|since|although|though|so that|so(?! (?:close|near|far|much|many|few|high|low|long|[a-z]+ly)\b)|whereas|yet|then)\s",
         r"\s(?:and|or)\s(?=(?:i|there|it|they|my|let|this|that|then|next)\b)",
         r"\s(?=that (?:i|we) (?:can|could|may|might|would|should|will|need|want|have to)\b)",
         r"\swhich\s(?=(?:may|might|could|would|means|tells|gives|should|must)\b)",
     ),
     verb=re.compile(
-        r"\b(?:i|we|is|are|was|were|see|there|has|have|had|can|could|will|would|should|may|might"
+        r"\b(?:i|we|is|are|was|were|see|there(?! on (?:my|the)\b)|has|have|had|can|could|will|would|should|may|might"
         r"|must|let|stands?|sits?|lies|rests?|hangs?|holds?|contains?|shows?|seems?|appears?|looks?"
         r"|needs?|isn't|aren't|don't|doesn't|catches|makes|remains?|comes|waits?|did|does|do|put"
         r"|go|open|close|take|turn|tells?|means|happens|turns|gives)\b|'s |'m |'ve |'ll |'re |n't "
     ),
-    aside=re.compile(rf", (?:which|who|that) [^,.{MARK}]{{0,60}},(?= (?:is|are|was|stands?|sits?|lies|rests?|hangs?|has|holds?)\b)"),
+    aside=re.compile(rf", (?:if (?:i (?:recall|remember)|memory serves)|as i (?:recall|remember)|by the way|of course|in fact|funnily enough|oddly enough|incidentally|as it happens|to be (?:sure|fair|honest)|for (?:some|whatever) reason|mind you|after all|i admit|i'm (?:glad|happy|sorry) to say)[^,.{MARK}]{{0,24}},(?= )|, (?:which|who|that) [^,.{MARK}]{{0,60}},(?= (?:is|are|was|stands?|sits?|lies|rests?|hangs?|has|holds?)\b)"),
     question=re.compile(r"\?[\"')]*\s*$"),
+    asking=re.compile(
+        r"^(?:and |but |so |now |or |then |well |oh |ah |,| )*(?:who|what|which|where|why|how|when|whose|whom|is|are|am|was|were|do|does|did|has|have|had|can|could|would|will|shall|should|may|might|must|isn't|aren't|wasn't|don't|doesn't|didn't|haven't|hasn't|can't|couldn't|won't|wouldn't|shouldn't|any|anything|anyone|or|not|no|perhaps|maybe|if|suppose)\b"
+    ),
     hedge=_any(
         _word(
             "may/might/could(?! not)/perhaps/maybe/possibly/probably/likely/likeliest/likelier/presumably"
@@ -107,8 +110,8 @@ PHRASES = Phrases(
         r"|n't\b|n’t\b"
     ),
     condition=_any(
-        r"\b(?:if|unless|in case|(?<!at )once(?! (?:before|already|more|again)\b|[,.;]|$)|until|as soon as|otherwise|before(?= [a-z])(?! (?:and|but|anything|everything|me|that|this|now|us|long)\b| (?:i|we) (?:[a-z]+ed|left|went|took|came|got|had|ever)\b| i'd\b)|provided|suppose|assuming"
-        r"|even when|whenever|wherever|would have|in order to|so as to)\b|\bwhen (?!i (?:[a-z]+ed|was|stood|saw|went|got|came|took|had)\b)"
+        r"\b(?:if(?! (?:i (?:remember|recall)|memory serves|i'm not mistaken|i am not mistaken)\b)|unless|in case|(?<!at )once(?! (?:before|already|more|again)\b|[,.;]|$)|until|as soon as|otherwise|before(?= [a-z])(?! (?:and|but|anything|everything|me|that|this|now|us|long)\b| (?:i|we) (?:[a-z]+ed|left|went|took|came|got|had|ever|even|put|shut|set|saw|found|made|ran|stood|gave|held|brought)\b| i'd\b)|provided|suppose|assuming"
+        r"|even when|whenever|wherever|would have|in order to|so as to)\b|\bwhen (?!i (?:last |first |finally |just |only )?(?:[a-z]+ed|was|stood|saw|went|got|came|took|had|put|shut|set|left|found|ran|made)\b)"
     ),
     goal=_any(
         r"\b(?:need(?:s|ed)?|have to|has to|look(?:ing)? for|search(?:ing|es|ed)? for|search of|hunt(?:ing)?"
@@ -279,8 +282,8 @@ PHRASES = Phrases(
         r"\bi(?:'m| am)(?: now| just| simply| therefore)?(?= (?:swinging|sliding|pressing|flipping|flicking|grasping|lifting|collecting|bringing|carrying|stepping|returning|checking|searching|looking around|ending|stopping|finishing|laying|leaving (?:it|the §|§)|going|heading|walking|moving|running|opening|pulling|closing|shutting|picking|grabbing|taking|fetching|putting|placing|dropping|setting|switching|turning)\b)",
         r"\b(?:this (?:very )?(?:moment|second|instant)|right now|without delay|at once|here and now|before anything else|first of all|from here|straight away),? i(?:'m|'ll| am| will)?(?= )",
         r"\bi(?: now| hereby)? (?:declare|consider|count|call) [^,.;]{0,30}\b(?:and|,)(?= (?:end|stop|finish|leave|call))",
-        r"(?:^|: |, |; )(?:and |so |now |then |next |but |well |right )*(?=(?:off|over|on|back|across|straight|up) (?:over |on |back |straight )?to (?:the|that|this|my) )",
-        r"(?:^|: |, |; )(?:and |so |now |then |well |right )*(?=to the (?:[a-z]+ )?§(?:,? (?:then|now|next|i go)\b|[.!]|$))",
+        r"(?:^|: )(?:and |so |now |then |next |but |well |right )*(?=(?:off|over|on|back|across|straight|up) (?:over |on |back |straight )?to (?:the|that|this|my) )",
+        r"(?:^|: )(?:and |so |now |then |well |right )*(?=to the (?:[a-z]+ )?§(?:,? (?:then|now|next|i go)\b|[.!]|$))",
         r"^i(?= (?:now |therefore |simply |then )?(?:take|press|flip|end|stop|finish|swing|slide|pull|step|look around|go|head|walk|open|close|shut|pick|take|grab|place|switch|toggle|navigate|return|approach)\b)",
     ),
     before_act=re.compile(_BEFORE_ACT),

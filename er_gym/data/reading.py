@@ -86,11 +86,14 @@ def read(text: str, language: Language) -> tuple[Clause, ...]:
         sentence = phrases.aside.sub("", sentence)
         asks = bool(phrases.question.search(sentence))
         before: tuple[Mention, ...] = ()
+        parts = _clauses(sentence, phrases)
+        asking = False
         supposed = coming = bool(phrases.coming.search(sentence))
-        for part in _clauses(sentence, phrases):
+        for k, part in enumerate(parts):
             count = part.count(MARK)
             mine, queue = tuple(queue[:count]), queue[count:]
             body = part.strip()
+            asking = asking or bool(phrases.asking.search(body))
             if phrases.contrast.search(body):
                 supposed = coming
             supposed = supposed or bool(phrases.supposition.search(body))
@@ -100,7 +103,7 @@ def read(text: str, language: Language) -> tuple[Clause, ...]:
                     mentions=mine,
                     sentence=number,
                     last=number == len(sentences) - 1,
-                    asks=asks,
+                    asks=asks and (asking or k == len(parts) - 1),
                     hedged=bool(phrases.hedge.search(body)),
                     negated=bool(phrases.negation.search(body)),
                     conditional=supposed or bool(phrases.condition.search(body)),

@@ -14,7 +14,7 @@ from er_gym.data.phrases import MARK, Phrases
 from er_gym.data.reading import Clause
 
 _AT = re.compile(
-    r",\s+(?=(?:neither|none|nor|which|hardly|plain|and no|and nothing|not|no|that|where|who|i|i'm"
+    r",\s+(?=(?:neither|none|nor|which|hardly|plain|and no|and yet no|yet no|and nothing|not|no|that|where|who|i|i'm"
     r"|i've|i'll|so|but|though|with|there|it|it's|yet|because|since|as|let|let's|nothing|having|then"
     r"|and i|and then|and now|and that|and so|and there|and it|now|only to|hence|one)\b)"
     r"|\s+but\s+(?=i\b|no\b|not\b|it\b|there\b)|\s+and\s+(?=neither\b|none\b|nothing\b|never\b|not\b)"

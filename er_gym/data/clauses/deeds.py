@@ -237,7 +237,7 @@ def judge_answers(thought: Thought) -> Iterator[Verdict]:
             continue
         said = [why for why, each in lexicon.answers.items() if each.search(span.text)]
         if not said or lexicon.undone.search(
-            span.text, max(0, told.start() - _ROUND), told.end() + _ROUND // 2
+            span.text, max(0, told.start() - _ROUND), told.end() + 3
         ):
             continue
         meant = _meant(thought, span, told.start())
@@ -265,7 +265,7 @@ def judge_answers(thought: Thought) -> Iterator[Verdict]:
         )
 
 
-_ROUND = 12
+_ROUND = 3
 """Letters before an answer in which it is denied."""
 _ENDED = re.compile(r"[.。]")
 

@@ -78,7 +78,8 @@ class Lexicon:
         compared: a distance that is only compared.
         of_any: before ``y``: it is none in particular.
         contents: says what ``y`` contains.
-        shut: says that ``y`` is closed.
+        shut: says that a name, at its beginning or its end, is closed.
+        ignorance: that is not known.
     """
 
     deeds: Mapping[str, Sequence[Words]]
@@ -143,3 +144,4 @@ class Lexicon:
     of_any: Words
     contents: Sequence[Words]
     shut: Words
+    ignorance: Words

@@ -170,7 +170,7 @@ LEXICON = Lexicon(
         re.compile(r"\bonly (?:once|after|when) (?P<a>[^.;,]{0,90}?§[^.;,]{0,90}?),? did i (?P<b>[^.;,]{0,90}?§)"),
     ),
     planned=re.compile(r"\b(?:will|'ll|let|going to|shall|should|need|must|could|would|can|may|might|want|plan|if|if i|until|to do|i'm|i am|had i|hadn't|next step)\b"),
-    told=re.compile(r"\b(?:told(?! to\b)|system|message|feedback|remark|reply|replied|response|reported|complain(?:ed|t)|came back (?:as|with)|was (?:turned down|refused|rejected|denied)|refused (?:to|when|my)|notice (?:said|read)|notified|informed|according to (?:the )?(?:system|message|answer|reply|feedback|response)|warned|advised|error said|it said|they said(?! to\b))\b"),
+    told=re.compile(r"(?<!nobody )(?<!didn't )(?<!not )(?<!never )\b(?:the complaint was|the reason (?:given|was)|complaint|said (?:that|my|the|it|there|none|no)|told(?! to\b)|system|message|feedback|remark|reply|replied|response|reported|complain(?:ed|t)|came back (?:as|with)|was (?:turned down|refused|rejected|denied)|refused (?:to|when|my)|notice (?:said|read)|notified|informed|according to (?:the )?(?:system|message|answer|reply|feedback|response)|warned|advised|error said|it said|they said(?! to\b))\b"),
     answers={
         "full hand": re.compile(r"\b(?:hands?|arms?|grip|gripper) (?:was|were|is|are|being|already|had been)?\s*(?:already )?(?:full|occupied|busy|taken)|full hands?|already (?:held|holding|carrying|hold)|too (?:much|many)(?: things)? in my hands?"),
         "empty hand": re.compile(r"\b(?:hands?|grip|gripper) (?:was|were|is|are) empty|nothing in my hand"),
@@ -328,6 +328,7 @@ LEXICON = Lexicon(
         re.compile(rf"{MARK} (?:is|are|'s|sits|lies|waits|hides)(?: (?:right|sitting|lying|waiting|hidden|hiding|safely|tucked away|already|still))* (?:in|inside|within) {_D}{_Y}"),
         re.compile(rf"\bevery one of {_D}{_Y} is\b"),
     ),
-    shut=re.compile(rf"\b(?:closed|shut|unopened) {MARK}"),
+    shut=re.compile(rf"\b(?:closed|shut|unopened|never-opened|untouched) {MARK}|{MARK},? (?:that |which )?(?:i(?:'ve| have)? (?:never|not|n't|haven't)(?: yet| even)? (?:opened|touched|looked (?:in|into)|checked)|i haven't (?:opened|touched|looked into|checked)|(?:was|is|has been) never opened|nobody has opened)"),
+    ignorance=re.compile(r"\b(?:don't know|do not know|can't (?:tell|say|know|be sure)|cannot (?:tell|say|know|be sure)|no idea|anybody's guess|anyone's guess|who knows|unknown|no telling|hard to say|wonder|remains to be seen|i'll see|let me see|find out)\b"),
 )  # fmt: skip
 """English."""

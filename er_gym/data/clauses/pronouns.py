@@ -38,6 +38,8 @@ _AS_OBJECT: Mapping[Language, Words] = {
     "zh": re.compile(r"(?!)"),
 }
 """The same in the middle of a clause."""
+PRONOUN = -1
+"""Where the mention of a pronoun starts: nowhere in the text."""
 _MOST = 3
 """So many things a pronoun may stand for: what is said must be false of each."""
 _OF_TOPIC: Mapping[Language, Words] = {
@@ -75,7 +77,9 @@ _ONLY_NAMES: Mapping[Language, Words] = {
 """A sentence that names one thing and says nothing of it."""
 _CALLS: Mapping[Language, Words] = {
     "en": re.compile(rf"^(?:and |but |now |as for |what about )*(?:the |my |that )?{MARK}:$"),
-    "zh": re.compile(rf"^(?:至于|说到|而|那)?{MARK}(?:呢|嘛|么)[，,]$"),
+    "zh": re.compile(
+        rf"^(?:至于|说到|而|那)?(?:[一]?[个只张把台块条本支])?(?:[\u4e00-\u9fff]{{1,4}}的)?{MARK}(?:呢|嘛|么|啊)?[，,]$"
+    ),
 }
 """A clause that does so within a sentence."""
 _REACH = 2
@@ -132,9 +136,9 @@ def _meant(last: tuple[Mention, ...]) -> Mention | None:
     if not kinds or len(kinds) > _MOST:
         return None
     if len(kinds) == 1:
-        return last[-1]
+        return replace(last[-1], start=PRONOUN)
     text = "/".join(dict.fromkeys(mention.text for mention in last))
-    return replace(last[-1], text=text, types=frozenset().union(*kinds))
+    return replace(last[-1], start=PRONOUN, text=text, types=frozenset().union(*kinds))
 
 
 def _with(each: Clause, mention: Mention, match: re.Match[str]) -> Clause:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from er_gym.data.clauses.adjuncts import reduced
 from er_gym.data.clauses.lexicon import Lexicon, Words
 from er_gym.data.clauses.lexicon_en import LEXICON as ENGLISH
 from er_gym.data.clauses.lexicon_zh import LEXICON as CHINESE
@@ -94,7 +95,7 @@ def clauses_of(thought: Thought) -> Sequence[tuple[Clause, Span]]:
     if found is None:
         found = thought.kept["clauses"] = [
             (each, Span(each.text, each.mentions, each.places, each.sentence, (each,)))
-            for each in (*thought.parts, *resolved(thought))
+            for each in (*thought.parts, *resolved(thought), *reduced(thought))
         ]
     return found
 
@@ -112,7 +113,7 @@ def _sentences(thought: Thought) -> Iterator[Span]:
     for each in thought.clauses:
         groups.setdefault(each.sentence, []).append(each)
     for number, clauses in groups.items():
-        text = " ".join(each.text for each in clauses)
+        text = ("" if thought.known.language == "zh" else " ").join(each.text for each in clauses)
         mentions = tuple(one for each in clauses for one in each.mentions)
         places = tuple(at for at, letter in enumerate(text) if letter == MARK)
         yield Span(text, mentions, places, number, tuple(clauses))

@@ -125,9 +125,15 @@ def judge_failures(thought: Thought) -> Iterator[Verdict]:
             if mention is None:
                 continue
             wanted = all_interchangeable(mention.types)
+            if " at " in match.group() and not _portable(mention):
+                continue  # it is where, not what
             fits = any(each.action.object_type in wanted for each in failed)
             refusal = Refusal("history", f"No action with {name_of(mention)} failed.")
             yield Verdict(span.sentence, None if fits else refusal)
+
+
+def _portable(mention: Mention) -> bool:
+    return any("pickupable" in OBJECT_TYPES[each].properties for each in mention.types)
 
 
 def _without(text: str, words: Iterable[str]) -> str:

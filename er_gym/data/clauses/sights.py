@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from er_gym.data.claims import is_given, is_placing, not_on
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, is_told, lexicon_of, sentences_of
 from er_gym.data.mentions import Mention, all_interchangeable
+from er_gym.data.reading import Clause
 from er_gym.data.remembered import BELIEVED
 from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.tasks import verbs
@@ -227,6 +228,8 @@ def judge_contents(thought: Thought) -> Iterator[Verdict]:
     for clause, span in clauses_of(thought):
         if not is_told(clause) or clause.intended or clause.past or clause.wanted:
             continue
+        if lexicon.ignorance.search(_whole(thought, clause)):
+            continue
         for match in span.matches(lexicon.contents):
             holder = span.named(match, "y")
             if holder is None or not holder.types & _KEEPS:
@@ -247,6 +250,11 @@ def judge_contents(thought: Thought) -> Iterator[Verdict]:
             )
 
 
+def _whole(thought: Thought, clause: Clause) -> str:
+    """The sentence that a clause is of."""
+    return next(each.text for each in sentences_of(thought) if each.sentence == clause.sentence)
+
+
 _TOUCHED = (verbs.OPEN, verbs.CLOSE, verbs.PUT)
 
 
@@ -258,6 +266,6 @@ def _is_known_inside(thought: Thought, span: Span, match: re.Match[str], holder:
     if any(each.on in holder.types for view in thought.views.values() for each in view):
         return True  # on its top, or behind glass
     shut = lexicon_of(thought).shut.search(span.text)
-    if shut and shut.end() == match.start("y") + 1:
+    if shut and match.start("y") in (shut.end() - 1, shut.start()):
         return False
     return any(thought.done(verb, holder.types) for verb in _TOUCHED)

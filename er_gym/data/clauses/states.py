@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from er_gym.data.claims import is_placing, not_on, subjects, told_to_be_on
+from er_gym.data.clauses.pronouns import PRONOUN
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, is_told, lexicon_of
 from er_gym.data.mentions import Mention, all_interchangeable
 from er_gym.data.reading import Clause
@@ -138,6 +139,8 @@ def judge_hand(thought: Thought) -> Iterator[Verdict]:
             if any(clause.says_before(sense, match.end()) for sense in senses):
                 continue
             for mention in clause.named(match, "xs", "x"):
+                if _is_vague(mention):
+                    continue
                 refusal = Refusal("held", f"{name_of(mention)} is not in the hand: {truth}.")
                 yield Verdict(span.sentence, None if mention.types & thought.held else refusal)
     # Whole clauses: "not the mug or the apple" denies both, and guesses nothing.
@@ -154,6 +157,13 @@ def judge_hand(thought: Thought) -> Iterator[Verdict]:
                     yield Verdict(
                         clause.sentence, refusal if mention.types <= thought.held else None
                     )
+
+
+def _is_vague(mention: Mention) -> bool:
+    """Whether a pronoun stands for what nobody holds: it was misread."""
+    return mention.start == PRONOUN and not any(
+        "pickupable" in OBJECT_TYPES[each].properties for each in mention.types
+    )
 
 
 def judge_supports(thought: Thought) -> Iterator[Verdict]:
