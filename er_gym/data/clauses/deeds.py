@@ -53,6 +53,8 @@ def judge_deeds(thought: Thought) -> Iterator[Verdict]:
                 begin = max(0, match.start() - _BEFORE)
                 if lexicon.unwilling.search(clause.text, begin, match.end()):
                     continue
+                if lexicon.in_vain.match(clause.text, match.end()):
+                    continue
                 denied = lexicon.undone.search(clause.text, begin, match.end())
                 if denied and lexicon.once_more.search(clause.text, begin):
                     continue

@@ -17,15 +17,18 @@ from er_gym.data.clauses.lexicon_glances import (
     LIMITS,
     NEVER,
     PERCEIVED,
+    RECALLED,
     REMEMBERS,
     SINCE_START,
     TURNED,
     VIEW_OF,
+    WHERE,
 )
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, sentences_of
 from er_gym.data.mentions import Mention
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
+from er_gym.thor import OBJECT_TYPES
 
 
 def only_thing(mentions: tuple[Mention, ...]) -> Mention | None:
@@ -106,6 +109,26 @@ def _unseen_so_far(thought: Thought, sentence: int, mention: Mention) -> Verdict
         sentence,
         Refusal("memory", f"{name_of(mention)} was in view before; do not say it never was."),
     )
+
+
+def judge_whereabouts(thought: Thought) -> Iterator[Verdict]:
+    """It is not known where a thing is: it was seen, and nobody has moved it since."""
+    language, known = thought.known.language, thought.known
+    done = {each.action.object_type for each in known.actions if each.success}
+    for span in sentences_of(thought):
+        if RECALLED[language].search(span.text) or any(each.conditional for each in span.clauses):
+            continue
+        for clause in span.clauses:
+            mention = clause.mentions[0] if clause.mentions else None
+            if mention is None or not WHERE[language].search(clause.text):
+                continue
+            moved = {*done} | thought.held | thought.in_view
+            if not mention.types <= {*known.seen} or mention.types & moved:
+                continue
+            if not all("pickupable" in OBJECT_TYPES[each].properties for each in mention.types):
+                continue
+            detail = f"{name_of(mention)} was in view before; do not wonder where it is."
+            yield Verdict(span.sentence, Refusal("memory", detail))
 
 
 def judge_lay(thought: Thought) -> Iterator[Verdict]:

@@ -36,6 +36,8 @@ JUDGES: tuple[Callable[[Thought], Iterator[Verdict]], ...] = (
     glances.judge_before_me,
     glances.judge_never_loosely,
     glances.judge_lay,
+    glances.judge_whereabouts,
+    reasons.judge_refused,
     loose.judge_hand_loosely,
     loose.judge_ease,
     loose.judge_taken,

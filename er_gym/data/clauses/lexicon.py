@@ -25,6 +25,7 @@ class Lexicon:
         first_try: a deed succeeded at once.
         undone: before or in a deed: it was not done.
         unwilling: before or in a deed: it was not wanted, or only tried.
+        in_vain: after a deed: it failed.
         once_more: a deed is denied in one direction or for a second time.
         nothing: what denies deeds of a kind altogether, by verb.
         none_here: after that: it is denied of some place or time.
@@ -88,6 +89,7 @@ class Lexicon:
     first_try: Words
     undone: Words
     unwilling: Words
+    in_vain: Words
     once_more: Words
     nothing: Mapping[str, Words]
     none_here: Words

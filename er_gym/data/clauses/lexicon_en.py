@@ -133,6 +133,7 @@ LEXICON = Lexicon(
     first_try=re.compile(r"\b(?:at|on|with) (?:the|my) (?:very )?first (?:try|attempt|go|grab|shot)|\bfirst time round|\bfirst (?:try|attempt|grab) (?:worked|succeeded|went)|\b(?:straight off|in one go|at once|without a hitch)\b"),
     undone=re.compile(r"\b(?:nobody|no one|never|not|nothing|without|neither|nor|none|no|yet to|failed|unable)\b|n't\b"),
     unwilling=re.compile(r"\b(?:cannot|can't|rather than|instead of|tried to|meant to|wanted to|needn't|about to)\b"),
+    in_vain=re.compile(r"[^,.;§]{0,12}\b(?:in vain|without success|to no avail|but (?:it )?failed|failed|came to nothing|missed)\b"),
     once_more=re.compile(r"\b(?:back|again|off|twice|a second time|properly|fully|quite|thoroughly|either of)\b"),
     nothing={
         verbs.OPEN: re.compile(r"(?:\bnot|n't|\bnever|yet to)(?: (?:yet|even|actually|ever|so far))* (?:opened?) (?:a (?:single )?thing|anything|any (?:of (?:the|these) )?(?:container|door|thing)s?|one thing)\b|\bopened (?:nothing|not a thing)\b|\bnothing(?: at all)? (?:has been|was|is) opened\b|\bwithout (?:ever |once )?opening anything\b"),

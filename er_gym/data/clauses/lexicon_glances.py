@@ -93,6 +93,16 @@ LIMITS = _words(
     rf"现在|这儿|眼下|此刻|此处|当前|角度|方向|这边|再|清楚|仔细|别的|其他|另|第二|在{MARK}|{MARK}(?:里|上|中|旁|那|后|下|内|跟|边)|打开|里面|哪个|这么|这样|拿|碰过|动过|用过",
 )
 """Limits what was never seen to a place or time, or to things of some kind."""
+WHERE = _words(
+    rf"\bwhere (?:on earth |in the world |exactly |else )?(?:could|can|might|may|is|are|did|has|have|do|does|would|should|the)\b|\b(?:no|not (?:a|the)(?: faintest| slightest| least)?|any|without a) (?:clue|idea|notion|hint|inkling)\b|\b(?:don't|do not|can't|cannot) (?:know|say|tell|imagine|think|guess) where\b|\bwhereabouts\b|\bhiding\b|\banyone's guess\b|\banybody's guess\b|\b(?:still )?(?:unaccounted for|to be found|to be located|missing)\b",
+    r"在哪|哪儿去|哪里去|上哪|去哪|何处|哪个角落|下落|没有?着落|没(?:有)?头绪|毫无头绪|没(?:有)?线索|找不着|无影无踪|猜不(?:到|出)|没准在|不知道[^，。]{0,6}(?:放|搁|藏|躲|丢|摆)",
+)
+"""The whereabouts of a thing are not known."""
+RECALLED = _words(
+    r"\b(?:saw|seen|noticed|spotted|remember|recall|recalled|was|were|lay|sat|stood|earlier|before|back|left|same|again|still|glimpsed|last|know|put|had|that one|took|taken)\b",
+    r"见过|看到|看见|瞧见|瞥见|记得|刚才|之前|原来|还在|仍|当时|先前|回去|回到|回头|拿|放下|知道|还是|来着|方向",
+)
+"""It is told that it was seen, or was moved since."""
 ASKED_EVER = _words(
     r"\b(?:did|have|had) i (?:ever|once|already|really|actually|not)?\b",
     r"见过|看到过|看见过|遇到过|碰到过|瞧见过|有没有见",
@@ -110,6 +120,7 @@ LAY = _phrases(
         rf"\b(?:saw|seen|noticed|spotted|remember|recall|found|glimpsed|came across)(?: seeing| having seen| there was| that)? (?:the |a |an |that |this |some |my )?(?:[a-z-]+ )?{_X}(?: (?:lying|sitting|standing|resting|perched|left|was|hanging|stood|being|placed|tucked))* (?:on top of|on|in|inside|atop|upon) (?:the |a |an |that |this )?(?:[a-z-]+ )?{_Y}",
     ),
     (
+        rf"{_X}(?:(?![没不未要把将]|在{MARK})[\u4e00-\u9fff，]){{0,12}}?在(?:了)?(?:那|这)?(?:[张个只台把块条]?)(?:[\u4e00-\u9fff]{{1,3}}的)?{_Y}(?:的)?(?:上|里|中|内|角|边沿|顶)",
         rf"{_X}(?:我记得|是|当时|原先|原来|原本|本来|之前|刚才|先前|最初|一开始|起初|最早|那时|曾|就|明明|一直|我|看到的时候|看见的时候|的时候|，)*(?:摆|放|躺|搁|立|挂|待|靠|收|塞|装|留|落|插|搭)在(?:了)?(?:那|这)?(?:[张个只台把块]?){_Y}(?:的)?(?:上|里|中|内)",
         rf"{_Y}(?:的)?(?:里面|里头|上面|里|上|中)(?:当时|原先|原来|本来|之前|刚才|先前|那时|曾|就|还|只|明明|确实)*(?:躺着|放着|摆着|搁着|立着|挂着|装着|藏着|塞着|有)(?:过)?(?:一|两|几)?(?:[把个只张台块条本瓶])?(?:[\u4e00-\u9fff]{{1,3}}的)?{_X}",
     ),

@@ -28,6 +28,8 @@ class ReasonWords:
         except_one: but some did, or it is told of some time only.
         easily: ``x`` was taken at the first try.
         failed_with: an action with ``x`` failed.
+        did_fail: a deed failed.
+        fails_not: but not so, or it is told of something else.
         untouched: nothing was done to ``x``.
         not_next: the next action is not done to ``x``, by verb.
         own_words: the agent thought of ``x`` before.
@@ -42,6 +44,8 @@ class ReasonWords:
     except_one: Words
     easily: Sequence[Words]
     failed_with: Sequence[Words]
+    did_fail: Words
+    fails_not: Words
     untouched: Sequence[Words]
     not_next: Mapping[str, Sequence[Words]]
     own_words: Sequence[Words]
@@ -104,6 +108,10 @@ ENGLISH = ReasonWords(
         rf"\bi (?:did try|tried) (?:to [a-z ]{{2,20}}|for) {_D}{_X} (?:in vain|without (?:any )?(?:success|luck))",
         rf"{_X} (?:{_FAILS.replace('missed|', '').replace('failed|', '')}) when i (?:tried|grabbed|reached|pulled)",
     ),
+    did_fail=re.compile(
+        r"\b(?:was|were|got|been) (?:refused|rejected|turned down|denied|declined|disallowed|unsuccessful|in vain)\b|\b(?:failed|didn't work|did not work|didn't succeed|did not succeed|didn't go through|came to nothing|went wrong|fell through|misfired|fell flat|backfired|didn't come off|flopped)\b"
+    ),
+    fails_not=re.compile(r"\b(?:not|never|nobody|no|none|nothing|n't (?:refused|fail)|nearly|almost|without|if|might|may|would|could|will|until|before|to see|because|reason|once|again)\b"),
     untouched=_all(
         rf"\b(?:i|we)(?:'ve| have|'d)?(?: (?:never|not|yet to|did not|didn't|n't))+(?: (?:yet|once|even|ever|so far|so much as))* (?:touched?|laid (?:a )?(?:hand|finger) on|lay (?:a )?(?:hand|finger) on) {_D}{_X}(?=$|[.,;]| (?:so far|yet|at all|in all))",
         rf"\bhaven't(?: (?:yet|once|even|ever|so far|so much as))* (?:touched|laid (?:a )?(?:hand|finger) on) {_D}{_X}(?=$|[.,;]| (?:so far|yet|at all|in all))",
@@ -168,6 +176,8 @@ CHINESE = ReasonWords(
     failed_with=_all(
         rf"(?:拿|取|捡|抓|打开|拉开|关上|关|合上|拧|按|放){_Z}{_X}(?:的)?(?:时候|时|那次|那回|那一下)?，?(?:我)?(?:却|可|但|就|都|也)*(?:失败了|没成功|没成(?=$|[，。])|没能成功|不成功)",
     ),
+    did_fail=re.compile(r"没(?:有|能)?(?:成功|成(?!了)|拿成|放成|关成|开成|办成)|失败(?:了|过)|被拒(?:绝)?(?:了|过)?|落了?空|扑了?空|没拿起来|没打开来|没放进去|没放成|出了岔子|告吹|砸了|失了手"),
+    fails_not=re.compile(r"不是|没有失败|没失败|没被拒|差点|几乎|如果|要是|可能|会(?!儿)|怕|别|除|因为|原因|为什么|次"),
     untouched=_all(
         rf"{_X}(?:我)?(?:到现在|至今|目前|从头到尾|压根|根本|一直|从来|一次|一下|还|连)*(?:碰|动|摸)?(?:都|也)?(?:还)?没(?:有)?(?:碰|摸)过?(?=$|[，。])",
     ),

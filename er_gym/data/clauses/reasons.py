@@ -132,6 +132,30 @@ def judge_failures(thought: Thought) -> Iterator[Verdict]:
             yield Verdict(span.sentence, None if fits else refusal)
 
 
+def judge_refused(thought: Thought) -> Iterator[Verdict]:
+    """A deed failed, told with its verb and its thing in any order."""
+    words, known = REASONS[thought.known.language], thought.known
+    plain = lexicon_of(thought).plain_verbs
+    for clause, span in clauses_of(thought):
+        if _is_open(clause) or clause.intended or not span.mentions or len(span.mentions) > 2:
+            continue
+        failure = words.did_fail.search(clause.text)
+        if failure is None or words.fails_not.search(clause.text):
+            continue
+        rest = clause.text[: failure.start()] + " " + clause.text[failure.end() :]
+        said = {verb for verb, phrase in plain.items() if phrase.search(rest)} - {verbs.NAVIGATE}
+        if not said:
+            continue
+        types = all_interchangeable(each for one in span.mentions for each in one.types)
+        failed = [each.action for each in known.actions if not each.success]
+        fits = any(
+            each.object_type in types and (each.verb in said or len(said) > 1) for each in failed
+        )
+        names = " and ".join(map(name_of, span.mentions))
+        refusal = Refusal("history", f"No such action with {names} failed.")
+        yield Verdict(span.sentence, None if fits else refusal)
+
+
 def _portable(mention: Mention) -> bool:
     return any("pickupable" in OBJECT_TYPES[each].properties for each in mention.types)
 

@@ -157,6 +157,8 @@ def judge_guesses(thought: Thought) -> Iterator[Verdict]:
     for clause, span in clauses_of(thought):
         if not clause.hedged or clause.asks or clause.conditional or clause.intended:
             continue
+        if any(each.asks for each in thought.clauses if each.sentence == clause.sentence):
+            continue
         if BELIEVED[thought.known.language].search(clause.text):
             continue
         if clause.usual or clause.negated or lexicon.another.search(clause.text):
