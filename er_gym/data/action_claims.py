@@ -146,7 +146,12 @@ class Decided:
 def _hangs_on_another(thought: Thought, clause: Clause) -> bool:
     """Whether a clause before it in its sentence says on which condition it holds."""
     before = itertools.takewhile(lambda each: each is not clause, thought.clauses)
-    return any(each.sentence == clause.sentence and each.conditional for each in before)
+    return any(
+        each.sentence == clause.sentence
+        and each.conditional
+        and not each.text.startswith("before ")
+        for each in before
+    )
 
 
 def _is_coming_job(thought: Thought, decided: Decided) -> bool:

@@ -300,7 +300,7 @@ PHRASES = Phrases(
             rf"(?:(?:in|into|inside|at|on|under|behind|through|over|closely|around|out|more|once|again|beneath|next|what|is|near|by) )*{_D}{_X}",
         ),
         "open": re.compile(rf"(?:opening|pulling open|open|open up|pull open) {_D}{_X}|(?:pulling|swinging|sliding|flinging|pull|swing|slide|fling) {_D}(?P<x2>{MARK}) open"),
-        "close": re.compile(rf"(?:closing|shutting|close|shut) {_AND_SO}|(?:swinging|pushing|sliding|pulling|swing|push|slide|pull) {_D}(?P<x2>{MARK})(?: door| lid)? (?:shut|closed|to|back in|home)\b"),
+        "close": re.compile(rf"(?:closing|shutting|close|shut)\b {_AND_SO}|(?:swinging|pushing|sliding|pulling|swing|push|slide|pull) {_D}(?P<x2>{MARK})(?: door| lid)? (?:shut|closed|to|back in|home)\b"),
         "put": re.compile(
             rf"(?:putting|placing|dropping|setting|put|place|set|drop|leave|lay|deposit|store|insert|bring|carry|deliver|transport) (?:it|them|this|{_D}{MARK})(?: \w+)? (?:in|into|on|onto|to|inside|on top of|over to|down on) {_D}{_X}"
             rf"|(?:taking|take) (?:it|them|this|{_D}{MARK})(?: (?:back|along|over|straight|right))* (?:into|onto|to|over to) {_D}(?P<x2>{MARK})"

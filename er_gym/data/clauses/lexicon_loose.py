@@ -29,7 +29,7 @@ HAND = _words(
     r"|\bcom(?:e|ing) away with\b|\b(?:i|it|hand|fingers|gripper)(?:'m| am| is| are)?(?: [a-z]+ly| still"
     r"| now| already)* (?:hold|holds|holding|carry|carrying|clutch|clutching|grip|gripping|cradle"
     r"|cradling|grasping|wield|wielding)\b|\bpocketed\b",
-    r"(?:手|掌|怀)(?:里|上|中|心)(?:正|还|已经|现在|此刻|仍|一直|稳稳|紧紧|牢牢|地|我)*"
+    r"(?:手|掌|怀)(?:里|上|中|心)(?:这|那)(?:[个只张把台块条本支])|一手(?=§)|(?:手|掌|怀)(?:里|上|中|心)(?:正|还|已经|现在|此刻|仍|一直|稳稳|紧紧|牢牢|地|我)*"
     r"(?:[拿握攥举抓捏捧抱提端拎托夹]|是|有)|(?:被我|我)(?:已经|正|稳稳|紧紧|牢牢|地|早)*"
     r"[拿握攥抓捏捧抱拎托](?:着|稳|牢|紧|在手)|[拿握攥抓捏捧抱拎托]在(?:我)?(?:的)?(?:手|掌|怀)",
 )

@@ -64,6 +64,9 @@ _FIRST = r"(?:(?:at|on|with) (?:the|my) (?:very )?first|at once|straight away|ri
 
 ENGLISH = ReasonWords(
     goes_to=_all(
+        rf"{_X}(?:'s|,? (?:which |that )?(?:is|are|was|were)) (?:to be (?:put|placed|dropped|left|stored|stowed|laid)|bound|destined|headed|due|intended|meant|(?:supposed|meant|intended) to (?:go|be put|be placed|end up|land|be left|be stored|wind up|finish up|be)) {_INTO}",
+        rf"{_X}(?:'s|,? (?:which |that )?(?:is|are|was|were)) (?:bound|destined|headed|due|intended|meant) for {_D}{_Y}",
+        rf"\b(?:because|since|as|so that|in order to|so as to|for|the reason)\b[^.;§]{{0,40}}\b(?:put|place|drop|store|leave|set|lay|stow|deliver|bring|carry|take) {_D}{_X} {_INTO}",
         rf"{_X},? (?:which |that )?(?:is|are|was|were) (?:supposed|meant|intended) to (?:go|be put|be placed|end up|land) {_INTO}",
         rf"{_X} (?:goes|has to (?:go|be put|be placed|end up)|have to (?:go|be put|end up)|needs? to (?:go|be put|be placed|end up)|must (?:go|be put|be placed|end up)|(?:is|are) wanted|(?:is|are) to (?:go|be put|be placed|end up)) {_INTO}",
         rf"\b(?:because|since|as)\b[^.]{{0,20}}{_X} belongs? {_INTO}",

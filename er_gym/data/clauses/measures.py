@@ -28,19 +28,19 @@ def judge_numbers(thought: Thought) -> Iterator[Verdict]:
     """So many things of a type are in view."""
     lexicon = lexicon_of(thought)
     for clause, span in clauses_of(thought):
-        if not is_told(clause) or clause.intended or clause.past or clause.negated:
+        if not is_told(clause) or clause.intended or clause.past:
             continue
         if lexicon.uncounted.search(clause.text):
             continue
         few = {
             place: (match, mention)
             for match in span.matches(lexicon.only)
-            if (mention := span.named(match, "x"))
+            if (mention := span.named(match, "x")) and not _is_denied(thought, clause, match)
             for place in (match.start("x"),)
         }
         for match in lexicon.counted.finditer(clause.text):
             mention = span.named(match, "x")
-            if mention is None:
+            if mention is None or _is_denied(thought, clause, match):
                 continue
             number = lexicon.numbers.get(match["n"], 0)
             there = sum(1 for _ in thought.things(mention.types))
@@ -52,6 +52,11 @@ def judge_numbers(thought: Thought) -> Iterator[Verdict]:
             those = _counted(thought, clause, span, mention)
             if those:
                 yield Verdict(span.sentence, _miscount(mention, 1, len(those), len(those)))
+
+
+def _is_denied(thought: Thought, clause: Clause, match: re.Match[str]) -> bool:
+    """Whether a count is denied: what is denied after it does not matter."""
+    return thought.phrases.negation.search(clause.text[: match.start()]) is not None
 
 
 def _miscount(mention: Mention, number: int, most: int, least: int) -> Refusal | None:

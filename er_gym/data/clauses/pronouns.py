@@ -19,7 +19,7 @@ from er_gym.data.trajectory import Language
 
 _STANDS_FOR: Mapping[Language, Words] = {
     "en": re.compile(
-        r"^(?P<start>(?:and|but|so|no|yes|now|well|,| )*)(?P<it>it|they)(?=\b)"
+        r"^(?P<start>(?:and|but|so|no|yes|now|well|,| )*)(?P<it>it|they|both)(?=\b)"
         r"|(?<=see )(?P<none>none)(?=$|[,.;!]| (?:anywhere|here|in sight|in view"
         r"|around|that i can see))"
         r"|\b(?P<one>(?:of |see |seen |noticed |spotted )(?:one|it))"
@@ -65,6 +65,20 @@ _NO_SUBJECT: Mapping[Language, Words] = {
     ),
 }
 """How a clause begins that leaves out what it is about."""
+_PART_OF: Mapping[Language, Words] = {
+    "en": re.compile(r"^(?:and |but |with |yet )*(?:its|the) (?:doors?|lid|cover|screen)\b '?"),
+    "zh": re.compile(
+        r"^(?:而且|可|但|连)?(?:它的)?(?:柜门|门|盖子?|屏幕|抽屉门)(?=[^，。]{0,4}(?:开|关|敞|合|掀|盖|闭))"
+    ),
+}
+"""A part of the thing before, whose state is that of the thing."""
+_RECALLS: Mapping[Language, Words] = {
+    "en": re.compile(r"(?!)"),
+    "zh": re.compile(
+        r"^(?:我?(?:还)?记得|我(?:刚才|先前|之前|当时|早先)|刚才|先前|之前|原先|原来|当时|明明|本来)"
+    ),
+}
+"""How a clause begins that goes on to tell where the topic was."""
 _ONLY_NAMES: Mapping[Language, Words] = {
     "en": re.compile(
         rf"^(?:and |but |now |so |as for |what about |how about |ah |oh |well |the |a |an |my |that |this |any |some|,| |[a-z]+ (?={MARK}))*"
@@ -106,6 +120,9 @@ def resolved(thought: Thought) -> Iterator[Clause]:
             before = _meant(last)
             if match and match.start() == 0 and match["it"] and before and near:
                 yield _with(each, before, match)
+            within = topic.sentence == each.sentence
+            if topic.mention and within and _RECALLS[language].match(each.text):
+                yield _named(each, topic.mention, MARK + each.text)
             last = (*last, *each.mentions) if named_in == each.sentence else each.mentions
             named_in = each.sentence
             whole = [one for one in thought.parts if one.sentence == each.sentence]
@@ -115,6 +132,10 @@ def resolved(thought: Thought) -> Iterator[Clause]:
             )
             sets = sets or (len(each.mentions) == 1 and bool(_CALLS[language].search(each.text)))
             topic = _Topic(each.mentions[-1], each.sentence) if sets else _Topic()
+            continue
+        part = _PART_OF[language].match(each.text)
+        if part and near and (before := _meant(last)) and not each.asks:
+            yield _named(each, before, MARK + " " * (language == "en") + each.text[part.end() :])
             continue
         about = 0 <= each.sentence - topic.sentence <= _REACH
         if about and topic.mention and not each.asks:

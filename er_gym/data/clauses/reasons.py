@@ -24,9 +24,9 @@ def judge_purposes(thought: Thought) -> Iterator[Verdict]:
     )
     pairs = _asked_pairs(known.instruction)
     for span in sentences_of(thought):
-        if any(_is_open(each) or each.negated for each in span.clauses):
-            continue
         for match in span.matches(words.goes_to):
+            if any(_is_open(each) or each.negated for each in _told_in(span, match)):
+                continue
             thing, place = span.named(match, "x"), span.named(match, "y")
             own = frozenset(_types(known.decision.object_type))
             if thing is None or not (place.types if place else own):
@@ -35,7 +35,7 @@ def judge_purposes(thought: Thought) -> Iterator[Verdict]:
                 continue
             places = place.types if place else all_interchangeable(own)
             settled = len(pairs) == 1 or any(
-                thing.types & all_interchangeable([each]) for each, _ in pairs
+                thing.types & all_interchangeable(each) for each, _ in pairs
             )
             wrong = (
                 not thing.types & asked
@@ -48,26 +48,33 @@ def judge_purposes(thought: Thought) -> Iterator[Verdict]:
             yield Verdict(span.sentence, refusal if wrong else None)
 
 
-def _asked_pairs(instruction: str) -> Sequence[tuple[str, str]]:
+def _told_in(span: Span, match: re.Match[str]) -> Sequence[Clause]:
+    """The clauses of a sentence in which a match begins; all if that cannot be told."""
+    mark = match.start("x")
+    mention = span.first(mark, mark + 1)
+    return [each for each in span.clauses if mention in each.mentions] or span.clauses
+
+
+_Pair = tuple[frozenset[str], frozenset[str]]
+
+
+def _asked_pairs(instruction: str) -> Sequence[_Pair]:
     """The things and places of an instruction that names them in turn; else nothing."""
-    named = [sorted(each.types) for each in find_mentions(instruction)]
-    if len(named) % 2 or any(len(each) != 1 for each in named):
+    named = [each.types for each in find_mentions(instruction)]
+    if len(named) % 2:
         return ()
-    flat = [each[0] for each in named]
-    pairs = list(zip(flat[::2], flat[1::2], strict=True))
+    pairs = list(zip(named[::2], named[1::2], strict=True))
     for thing, place in pairs:
-        if "pickupable" not in OBJECT_TYPES[thing].properties:
+        if not all("pickupable" in OBJECT_TYPES[each].properties for each in thing):
             return ()
-        if "receptacle" not in OBJECT_TYPES[place].properties:
+        if not any("receptacle" in OBJECT_TYPES[each].properties for each in place):
             return ()
     return pairs
 
 
-def _is_pair(
-    things: frozenset[str], places: frozenset[str], pairs: Iterable[tuple[str, str]]
-) -> bool:
+def _is_pair(things: frozenset[str], places: frozenset[str], pairs: Iterable[_Pair]) -> bool:
     return any(
-        things & all_interchangeable([thing]) and places & all_interchangeable([place])
+        things & all_interchangeable(thing) and places & all_interchangeable(place)
         for thing, place in pairs
     )
 
