@@ -308,7 +308,7 @@ PHRASES = Phrases(
         "take": _act("picking up|picking|taking out|taking|grabbing|fetching|pick up|pick|take out|take|grab|grasp|get|fetch|collect|lift|retrieve", _AND_SO),
         "toggle": re.compile(rf"(?:turning|switching|pressing|flipping|flicking|powering|lighting|turn|switch|power|toggle|flip|flick|press|activate|deactivate|light)(?: on| off| up| down)? {_D}{_X}|(?:turning|switching|turn|switch) (?:it|them) (?:on|off)\b"),
         "slice": _act("slice|cut|chop", _AND_SO),
-        "end": re.compile(r"(?:ending|stopping (?:here|now)|end|finish|stop(?! and\b)|conclude|wrap up|call it)(?: the task| here| now| it| this| there| my| everything| the)?\b"),
+        "end": re.compile(r"(?:ending|stopping (?:here|now)|end|finish(?! *(?:$|[.!,;]))|stop(?! and\b)|conclude|wrap up|call it)(?: the task| here| now| it| this| there| my| everything| the)?\b"),
     },
     later=re.compile(
         r"\b(?:later|afterwards?|after|eventually|finally|in the end|then|once|subsequently|at the end|lastly|next i|second|secondly|as well|also|still|come back|if need be|if necessary|only|and then|if|unless|when|until|before|otherwise|could|might|would|don't|not|no|never|rather than|instead of)\b|n't\b"

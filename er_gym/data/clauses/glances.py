@@ -6,6 +6,7 @@ A clause is read only if it speaks of one thing, and if no word in it may turn i
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 from er_gym.data.claims import is_placing, not_remembered_on
 from er_gym.data.clauses.lexicon_glances import (
@@ -82,13 +83,16 @@ def judge_never_loosely(thought: Thought) -> Iterator[Verdict]:
         mention = only_thing(span.mentions)
         if mention is None or any(each.asks or each.conditional for each in span.clauses):
             continue
-        if any(each.hedged for each in span.clauses) or not PERCEIVED[language].search(span.text):
+        never = NEVER[language].search(span.text)
+        if any(each.hedged for each in span.clauses) or never is None:
+            continue
+        if not PERCEIVED[language].search(span.text, never.start()):
             continue
         text = SINCE_START[language].sub(" ", span.text)
-        if NEVER[language].search(span.text) and not LIMITS[language].search(text):
+        if not LIMITS[language].search(text):
             yield _unseen_so_far(thought, span.sentence, mention)
     sentences = sentences_of(thought)
-    for asked, answer in zip(sentences, sentences[1:], strict=False):
+    for asked, answer in pairwise(sentences):
         mention = only_thing(asked.mentions)
         if mention is None or not any(each.asks for each in asked.clauses):
             continue

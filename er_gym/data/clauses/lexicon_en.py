@@ -242,7 +242,7 @@ LEXICON = Lexicon(
         re.compile(rf"{_X} (?:was|were|has been|have been) left (?:on|in|inside|over|atop|on top of) {_D}{_Y}"),
     ),
     never_seen=(
-        re.compile(rf"(?:(?<!could )(?<!did )(?<!do )\bnot|(?<!could)(?<!did)(?<!do)n't|\bnever|yet to)(?: (?:yet|once|even|ever|actually|so far|already))* (?:seen|laid eyes on|set eyes on|come across|spotted|noticed|sighted|encountered|glimpsed|caught sight of|lay eyes on|see|had sight of|run into|met)(?: (?:a|any|either|sign|trace|of|single|so|much|as|an?))* {_D}{_X}"),
+        re.compile(rf"(?:(?<!could )(?<!did )(?<!do )\bnot|(?<!could)(?<!did)(?<!do)(?<!ca)n't|\bnever|yet to)(?: (?:yet|once|even|ever|actually|so far|already))* (?:seen|laid eyes on|set eyes on|come across|spotted|noticed|sighted|encountered|glimpsed|caught sight of|lay eyes on|see|had sight of|run into|met)(?: (?:a|any|either|sign|trace|of|single|so|much|as|an?))* {_D}{_X}"),
         re.compile(rf"{_X} (?:has|had|have|'s)(?: (?:still|so far|yet|simply))*(?:n't| not| never| yet)(?: (?:yet|so far|once|ever|even))* (?:to )?(?:shown?(?: (?:itself|up|its face|themselves))?|turned up|appeared|crossed my path|come into (?:view|sight)|surfaced|been (?:seen|spotted|sighted|in view|in sight)|emerged|come up|caught my eye|revealed itself|made an appearance|popped up|met my eyes?)"),
         re.compile(rf"\bno {_D}{_X} (?:has|had|have)(?: (?:yet|so far|ever))* (?:shown (?:itself|up)|turned up|appeared|crossed my path|come into (?:view|sight)|surfaced|been (?:seen|spotted|sighted)|caught my eye|emerged)"),
         re.compile(rf"{_X},? (?:which |that |whom )?i(?:'ve| have) (?:not|never|yet to|n't)(?: (?:yet|once|even|ever|so far|actually))* (?:seen|laid eyes on|come across|spotted|noticed|encountered|set eyes on|see)"),

@@ -171,6 +171,8 @@ def judge_guesses(thought: Thought) -> Iterator[Verdict]:
                 continue
             if not mention.types & thought.seen or lexicon.of_memory.search(span.text):
                 continue
+            if thought.known.sought in mention.types and not mention.types & thought.in_view:
+                continue  # what is sought: er_gym.data.remembered
             wrong = not_on(thought, mention, holder)
             if wrong:
                 yield Verdict(
