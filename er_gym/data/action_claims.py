@@ -26,7 +26,11 @@ PAST_VERB = {
 _RECENT = 3
 """So many actions ago, a failure can still be spoken of as the last one."""
 _LAST = re.compile(r"\b(?:last|previous|preceding)\b|上一|上次|前一|刚")
-_STORY = re.compile(r"后来|才去的|之后才")
+_DENIES = re.compile(
+    r"\b(?:not|none|no|never|nothing|neither|without|hardly)\b|n't\b|没有?一|从没|没有?哪"
+)
+"""Before a failure: there was none."""
+_STORY = re.compile(r"后来|才去的|之后才|(?:末了|最后|临了|末尾)(?:才|是)|才(?:去|到|轮到)")
 """A sentence that tells what was done, one thing after another."""
 
 
@@ -92,6 +96,8 @@ def check_outcome(thought: Thought) -> Iterator[Refusal]:
         if clause.guessed and "seem" not in clause.text:
             continue
         failed = phrases.failed.search(clause.text)
+        if failed and _DENIES.search(clause.text, 0, failed.start()):
+            failed = None  # "not one of them went wrong"
         lately = failed and _LAST.search(failed.group())
         if failed and not (failed_lately if lately else _has_failed(thought, clause)):
             yield Refusal(

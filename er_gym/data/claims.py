@@ -54,9 +54,18 @@ def check_unseen(thought: Thought) -> Iterator[Refusal]:
             for match in phrase.finditer(clause.text):
                 if _wanted_before(clause, match, phrases) or clause.intended:
                     continue
+                if _ENOUGH.match(clause.text, match.end()):
+                    continue
                 for mention in subjects(clause, match, phrases):
                     if mention in strange:
                         yield _not_seen(mention)
+
+
+_ENOUGH = re.compile(
+    r" ?(?:了|过)?(?:就行|就好|就算|就成|便可|即可|就可以|才行|才算|再说)"
+    r"| (?:is|will be|would be) (?:enough|all)\b"
+)
+"""After what is seen: that is all that is asked for."""
 
 
 def check_hidden(thought: Thought) -> Iterator[Refusal]:
@@ -145,7 +154,10 @@ def check_side(thought: Thought) -> Iterator[Refusal]:
     for clause in (*thought.clauses, *resolved(thought)):
         if not clause.mentions or clause.guessed or clause.negated or clause.past:
             continue
-        for direction, nearly, groups in _sides(clause, thought.phrases):
+        told = [*_sides(clause, thought.phrases)]
+        for direction, nearly, groups in told:
+            if len(told) > 1 and len(clause.mentions) == 1:
+                break  # "ahead, on the left": something between them
             wrong = []
             for mention in groups:
                 places = {
@@ -166,7 +178,18 @@ def check_side(thought: Thought) -> Iterator[Refusal]:
 
 
 _WIDE = frozenset(
-    {"CounterTop", "DiningTable", "Bed", "Bathtub", "BathtubBasin", "Sofa", "ShelvingUnit", "Desk"}
+    {
+        "CounterTop",
+        "DiningTable",
+        "Bed",
+        "Bathtub",
+        "BathtubBasin",
+        "Sofa",
+        "ShelvingUnit",
+        "Desk",
+        "Dresser",
+        "TVStand",
+    }
 )
 """What is so wide that its centre may be ahead and the most of it on one side."""
 
@@ -179,7 +202,9 @@ def _bears_there(thought: Thought, mention: Mention, clause: Clause, direction: 
     return any(
         each.on in all_interchangeable(mention.types)
         and direction == (each.side if at == "ahead" else at)
-        for other in clause.mentions
+        for near in thought.clauses
+        if near.sentence == clause.sentence
+        for other in near.mentions
         for at, each in thought.things(other.types)
     )
 
@@ -355,8 +380,10 @@ def _sides(clause: Clause, phrases: Phrases) -> Iterator[tuple[str, bool, list[M
                     for place, mention in nearest
                     if not phrases.of_other.search(clause.text[begin:place])
                 ]
+                if len(found) > 1:  # "the left mug and on the right a vase": it may be either
+                    own += [mention for _, mention in list(_pairs(clause, end, stop))[:1]]
                 if own:  # else something without a name is there
-                    yield direction, nearly, [nearest[-1][1], *own[-1:]]
+                    yield direction, nearly, [nearest[-1][1], *own[-2:]]
 
 
 def _pairs(clause: Clause, start: int, end: int) -> Iterator[tuple[int, Mention]]:

@@ -97,7 +97,7 @@ PHRASES = Phrases(
         _word(
             "may/might/could(?! not)/perhaps/maybe/possibly/probably/likely/likeliest/likelier/presumably"
             "/potentially/possible/plausible/plausibly/conceivably/suppose/guess/assume/suspect"
-            "/expect/expected/imagine/wonder/wondering/hoped/had hoped/(?<!a )(?<!no )thought/can picture/i picture/picturing/chance/chances/hope/hoping/hopefully/bet"
+            "/supposedly/reportedly/allegedly/said to be/expect/expected/imagine/wonder/wondering/hoped/had hoped/(?<!a )(?<!no )thought/can picture/i picture/picturing/chance/chances/hope/hoping/hopefully/bet"
             "/should be/must be/must have/should have/ought to/seems/seem/appears to be/as if/as though"
             "/supposedly/apparently/unclear/unsure/not sure/uncertain/cannot tell/can't tell"
             "/(?:could|would|might|should|need|must)(?:n't| not)? have/would/i think/i believe/i'd(?! (?:[a-z]+ed|gone|been|taken|seen|put|shut|left|had|got|come|found|already|just|even)\b)/or/either/no idea/unless"

@@ -9,6 +9,7 @@ from er_gym.data.action_claims import PAST_VERB, has_done
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, lexicon_of, sentences_of
 from er_gym.data.knowledge import LastAction
 from er_gym.data.mentions import Mention, all_interchangeable
+from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.tasks import verbs
 from er_gym.thor import OBJECT_TYPES
@@ -55,6 +56,8 @@ def judge_deeds(thought: Thought) -> Iterator[Verdict]:
                     continue
                 if lexicon.in_vain.match(clause.text, match.end()):
                     continue
+                if _comes_next(thought, clause, verb, mention) or _is_told_in_vain(thought, clause):
+                    continue
                 denied = lexicon.undone.search(clause.text, begin, match.end())
                 if denied and lexicon.once_more.search(clause.text, begin):
                     continue
@@ -71,7 +74,7 @@ def judge_deeds(thought: Thought) -> Iterator[Verdict]:
             before = any(
                 each.mentions
                 for each in thought.clauses
-                if each.sentence == clause.sentence and each is not clause
+                if 0 <= clause.sentence - each.sentence <= 1 and each is not clause
             )
             if none and not (
                 lexicon.none_here.match(clause.text, none.end())
@@ -84,6 +87,36 @@ def judge_deeds(thought: Thought) -> Iterator[Verdict]:
                     if done
                     else None,
                 )
+
+
+_NOW = re.compile(r"先|把|将|拿了|那就")
+_TRIED = re.compile(
+    r"试着|试过|尝试|试图|企图|伸手|够过|\b(?:tried|tries|trying|attempted|reached|meant)\b"
+)
+_VAIN = re.compile(
+    r"没(?:能)?[^，。；§]{0,3}[成着到住起动]|落了?空|扑了?空|失手|失败|未果|不成"
+    r"|\b(?:fail(?:ed)?|missed|in vain|couldn't|could not|no luck|didn't|without success)\b"
+)
+
+
+def _comes_next(thought: Thought, clause: Clause, verb: str, mention: Mention) -> bool:
+    """Whether Chinese "first take the phone" tells what the next action does, not what was done."""
+    decision = thought.known.decision
+    return (
+        thought.known.language == "zh"
+        and decision.verb == verb
+        and decision.object_type in all_interchangeable(mention.types)
+        and bool(_NOW.search(clause.text))
+    )
+
+
+def _is_told_in_vain(thought: Thought, clause: Clause) -> bool:
+    """Whether a deed was only tried, or its sentence goes on to say that it failed."""
+    if _TRIED.search(clause.text):
+        return True
+    parts = [each for each in thought.clauses if each.sentence == clause.sentence]
+    at = next((k for k, each in enumerate(parts) if each.text == clause.text), len(parts))
+    return any(not each.mentions and _VAIN.search(each.text) for each in parts[at + 1 : at + 2])
 
 
 def _counts(each: LastAction, verb: str) -> bool:
@@ -237,6 +270,8 @@ def judge_answers(thought: Thought) -> Iterator[Verdict]:
         told = lexicon.told.search(span.text)
         if told is None or any(each.asks for each in span.clauses):
             continue
+        if _CANNOT_TELL.search(span.text, 0, told.start()):
+            continue
         said = [why for why, each in lexicon.answers.items() if each.search(span.text)]
         if not said or lexicon.undone.search(
             span.text, max(0, told.start() - _ROUND), told.end() + 3
@@ -267,6 +302,12 @@ def judge_answers(thought: Thought) -> Iterator[Verdict]:
         )
 
 
+_AT = re.compile(r"(?:\b(?:by|near|beside|at)(?: (?:the|that|this|my))?(?: [a-z-]+)? |[在到])$")
+_CANNOT_TELL = re.compile(
+    r"(?:\b(?:nobody|no one|nothing|can|could|will|would|might|won't)\b[^,.;]{0,12}"
+    r"|(?:没谁|没人|没有谁|没有人|无人|谁|能|会|可以|等)[^，。；]{0,3})$"
+)
+"""Before an answer: none was given."""
 _ROUND = 3
 """Letters before an answer in which it is denied."""
 _ENDED = re.compile(r"[.。]")
@@ -282,7 +323,10 @@ def _meant(thought: Thought, span: Span, told: int) -> list[LastAction] | None:
     What stands before the answer is what it was given to.
     """
     lexicon = lexicon_of(thought)
-    named = span.among(0, told) or span.mentions
+    pairs = list(zip(span.places, span.mentions, strict=True))
+    before = [each for each in pairs if each[0] < told]
+    # "By the curtain I was told" says where, not what was tried.
+    named = [each for at, each in before or pairs if not _AT.search(span.text, 0, at)]
     said = {verb for verb, phrase in lexicon.plain_verbs.items() if phrase.search(span.text)}
     types = all_interchangeable(each for mention in named for each in mention.types)
     if not types:

@@ -23,6 +23,9 @@ _KEEPS = frozenset({"Fridge", "Microwave", "Cabinet", "Drawer", "Safe", "Toilet"
 _START = "the start"
 
 
+_OUGHT = re.compile(r"(?:应该|该)[^，。；§]{0,3}[放搁送摆挂塞装收移扔丢还]")
+
+
 def judge_never_seen(thought: Thought) -> Iterator[Verdict]:
     """The agent never saw a thing."""
     lexicon = lexicon_of(thought)
@@ -171,6 +174,8 @@ def judge_guesses(thought: Thought) -> Iterator[Verdict]:
                 continue
             if not mention.types & thought.seen or lexicon.of_memory.search(span.text):
                 continue
+            if mention.types & thought.held and _OUGHT.search(clause.text):
+                continue  # "it should be put on the table" is no guess
             if thought.known.sought in mention.types and not mention.types & thought.in_view:
                 continue  # what is sought: er_gym.data.remembered
             wrong = not_on(thought, mention, holder)
