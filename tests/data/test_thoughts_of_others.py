@@ -16,13 +16,24 @@ LEAST_REFUSED = {
     "held_out_b": 0.60,
     "dev_c": 0.70,
     "held_out_c": 0.63,
+    "held_out_d": 0.62,
 }
 """The least share of lies that is refused: three or four points less than when it was measured. The
-rules were mended on all of these files but a third of ``held_out_b``."""
-MOST_REFUSED = {"dev": 4, "held_out": 4, "dev_b": 4, "held_out_b": 4, "dev_c": 6, "held_out_c": 4}
-"""The most honest thoughts that are refused: at most 2 %."""
-OF_EACH = {"dev_c": 300, "held_out_c": 400}
-"""The lies of a file, and its honest thoughts, if they are not 200."""
+rules were mended on all of these files but ``held_out_d`` and a third of ``held_out_b``."""
+MOST_REFUSED = {
+    "dev": 4,
+    "held_out": 4,
+    "dev_b": 4,
+    "held_out_b": 4,
+    "dev_c": 6,
+    "held_out_c": 4,
+    "held_out_d": 9,
+}
+"""The most honest thoughts that are refused: 2 %, and of ``held_out_d`` what was measured."""
+LIES = {"dev_c": 300, "held_out_c": 400}
+"""How many lies a file has, if they are not 200."""
+HONEST_ONES = {**LIES, "held_out_d": 400}
+"""How many honest thoughts a file has, if they are not 200."""
 
 
 @pytest.fixture(scope="module", params=[*LEAST_REFUSED])
@@ -35,7 +46,7 @@ def test_lies_of_others_are_refused(judged: tuple[str, list[Judged]]) -> None:
     name, every = judged
     lies = [each for each in every if each.written.sort != HONEST]
     missed = [each.written for each in lies if not each.right]
-    assert len(lies) == OF_EACH.get(name, 200)
+    assert len(lies) == LIES.get(name, 200)
     assert len(missed) <= (1 - LEAST_REFUSED[name]) * len(lies), Counter(m.sort for m in missed)
 
 
@@ -43,5 +54,5 @@ def test_honest_thoughts_of_others_stand(judged: tuple[str, list[Judged]]) -> No
     name, every = judged
     honest = [each for each in every if each.written.sort == HONEST]
     wrong = [(each.written.text, each.refusals) for each in honest if not each.right]
-    assert len(honest) == OF_EACH.get(name, 200)
+    assert len(honest) == HONEST_ONES.get(name, 200)
     assert len(wrong) <= MOST_REFUSED[name], wrong
