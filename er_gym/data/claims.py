@@ -9,9 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from er_gym.data.clauses.pronouns import resolved
 from er_gym.data.mentions import Mention, all_interchangeable, named_in
 from er_gym.data.phrases import MARK, Phrases
+from er_gym.data.pronouns import resolved
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.data.trajectory import SeenObject

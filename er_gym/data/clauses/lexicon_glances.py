@@ -63,7 +63,7 @@ TURNED = _words(
     r"\b(?:not|no|never|nor|neither|none|was|were|had|used to|if|when|whenever|until|till|once|would|could|might|may|should"
     r"|must|imagine|picture|as if|as though|like|need|needs|want|wanted|looking for|out of|will|soon|later|again|after|hope"
     r"|remember|recall|memory|saw|seen|earlier|before(?! me\b| my\b)|somewhere|other|another|else|than|without|hardly|let|going to|to (?:be|get|have|bring|see|find|put))\b|n't\b|'ll\b|\?",
-    r"没|不|未|无|别|如果|要是|假如|可能|也许|或许|应该|大概|会(?!儿)|要(?!紧|命)|想|等|时候|之前|刚才|刚刚|原来|原先|当时|曾|记得|过(?!来)|才|像|以为|除|吗|哪|另|再|一般|通常|往|去|找|把(?!手)|将|从(?!这)",
+    r"没|不|未|无|别|如果|要是|假如|可能|也许|或许|应该|大概|会(?!儿)|要(?!紧|命)|想|等|时候|之前|刚才|刚刚|原来|原先|当时|曾|记得|过(?!来)|才|像|以为|除|吗|哪|另|再|一般|通常|往|去|找|把(?!手)|将|从(?!这)|走|(?:来|回|赶|凑|跑|挪|移|站)到",
 )
 """Words that may turn the sense of such a claim."""
 PERCEIVED = _words(
@@ -78,7 +78,7 @@ NEVER = _words(
     r"|\b(?:can't|cannot|couldn't|don't|wouldn't|didn't|did not|do not) (?:[a-z']+ ){0,6}ever\b|\bno [^,.]{0,25}\bever\b|\b(?:doubt|deny)\b[^,.]{0,30}\bever\b"
     r"|\bnot [^,.]{0,30}\b(?:so far|all this time|since i (?:came|walked|entered|arrived|started|got))\b|\bno (?:sight|glimpse|sign|trace) of\b[^,.]{0,30}\b(?:so far|yet|all this time|until now|to date)\b"
     r"|\b(?:has|have|remains?|stayed|kept)\b[^,.]{0,15}\b(?:unseen|hidden from me|out of my sight)\b",
-    r"(?:从来|从|至今|到现在|到目前|目前为止|始终|一直|一次|一眼|一回|压根|根本|从头到尾|一路|迄今|到这会儿|进来以后|自始至终)[^，。]{0,10}(?:没|未|不曾|没有)|(?:没|没有|未|不曾)(?:有)?[^，。]{0,5}过|毫无印象|没有?(?:半点|一点|任何)?印象|还没[^，。]{0,4}(?:见|看|露|出现|遇|碰)",
+    r"(?:从来|从|至今|到现在|到目前|目前为止|始终|一直|一次|一眼|一回|压根|根本|从头到尾|一路|迄今|到这会儿|进来以后|自始至终)[^，。]{0,10}(?:没|未|不曾|没有)|(?:没|没有|未|不曾)(?:有)?[^，。]{0,5}过|毫无印象|没有?(?:半点|一点|任何)?印象",
 )
 """Ever since the beginning, not once."""
 SINCE_START = _words(

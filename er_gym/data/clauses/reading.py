@@ -10,9 +10,9 @@ from er_gym.data.clauses.adjuncts import reduced
 from er_gym.data.clauses.lexicon import Lexicon, Words
 from er_gym.data.clauses.lexicon_en import LEXICON as ENGLISH
 from er_gym.data.clauses.lexicon_zh import LEXICON as CHINESE
-from er_gym.data.clauses.pronouns import resolved
 from er_gym.data.mentions import Mention
 from er_gym.data.phrases import MARK
+from er_gym.data.pronouns import resolved
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought
 from er_gym.data.trajectory import Language

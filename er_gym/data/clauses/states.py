@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterator, Mapping
 
 from er_gym.data.claims import is_placing, not_on, subjects, told_to_be_on
-from er_gym.data.clauses.pronouns import PRONOUN
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, is_told, lexicon_of
 from er_gym.data.mentions import Mention, all_interchangeable
+from er_gym.data.pronouns import PRONOUN
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.tasks import verbs

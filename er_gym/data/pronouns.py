@@ -10,14 +10,13 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from er_gym.data.clauses.lexicon import Words
 from er_gym.data.mentions import Mention
 from er_gym.data.phrases import MARK
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Thought
 from er_gym.data.trajectory import Language
 
-_STANDS_FOR: Mapping[Language, Words] = {
+_STANDS_FOR: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(
         r"^(?P<start>(?:and|but|so|no|yes|now|well|,| )*)(?P<it>it|they|both)(?=\b)"
         r"|(?<=see )(?P<none>none)(?=$|[,.;!]| (?:anywhere|here|in sight|in view"
@@ -30,7 +29,7 @@ _STANDS_FOR: Mapping[Language, Words] = {
     "zh": re.compile(r"(?P<it>它(?!们|的(?!影|踪)|这|那|里|上))"),
 }
 """A pronoun for a thing that was named before."""
-_AS_OBJECT: Mapping[Language, Words] = {
+_AS_OBJECT: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(
         r"(?<=[a-z] )(?P<it>it|them|that one)(?=$|[,.;!?]| (?:in|on|up|down|into|from|out|off|with|to|back|away|now|yet|and"
         r"|at|for|over|open|shut|closed|firmly|tight|tightly|safely|already|as|so|since|before|while)\b)"
@@ -42,7 +41,7 @@ PRONOUN = -1
 """Where the mention of a pronoun starts: nowhere in the text."""
 _MOST = 3
 """So many things a pronoun may stand for: what is said must be false of each."""
-_OF_TOPIC: Mapping[Language, Words] = {
+_OF_TOPIC: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(
         r"\b(?P<none>none|nothing of the (?:sort|kind)|nowhere|no such thing)\b"
         r"|\b(?P<only>(?:no more than|only|just|but) (?:one|a single one)|a single one)\b"
@@ -54,7 +53,7 @@ _OF_TOPIC: Mapping[Language, Words] = {
     "zh": re.compile(r"(?P<it>它们?|那东西|这东西)(?![这那])"),
 }
 """The same after a sentence that sets a topic, at any place."""
-_NO_SUBJECT: Mapping[Language, Words] = {
+_NO_SUBJECT: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(
         r"^(?:no|yes|well|and|but|so|oh|,|;|:|-| )*(?:(?:not|still|already|never|yet|no longer|nowhere|safely|right"
         r"|just|now|firmly|wide|in|on|under|beside|behind|gone|done|here|there|closed|shut|open|off|lit|straight"
@@ -65,21 +64,21 @@ _NO_SUBJECT: Mapping[Language, Words] = {
     ),
 }
 """How a clause begins that leaves out what it is about."""
-_PART_OF: Mapping[Language, Words] = {
+_PART_OF: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(r"^(?:and |but |with |yet )*(?:its|the) (?:doors?|lid|cover|screen)\b '?"),
     "zh": re.compile(
         r"^(?:而且|可|但|连)?(?:它的)?(?:柜门|门|盖子?|屏幕|抽屉门)(?=[^，。]{0,4}(?:开|关|敞|合|掀|盖|闭))"
     ),
 }
 """A part of the thing before, whose state is that of the thing."""
-_RECALLS: Mapping[Language, Words] = {
+_RECALLS: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(r"(?!)"),
     "zh": re.compile(
         r"^(?:我?(?:还)?记得|我(?:刚才|先前|之前|当时|早先)|刚才|先前|之前|原先|原来|当时|明明|本来)"
     ),
 }
 """How a clause begins that goes on to tell where the topic was."""
-_ONLY_NAMES: Mapping[Language, Words] = {
+_ONLY_NAMES: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(
         rf"^(?:and |but |now |so |as for |what about |how about |ah |oh |well |the |a |an |my |that |this |any |some|,| |[a-z]+ (?={MARK}))*"
         rf"{MARK}(?:, {MARK})*[?.!:…,; ]*$"
@@ -89,7 +88,7 @@ _ONLY_NAMES: Mapping[Language, Words] = {
     ),
 }
 """A sentence that names one thing and says nothing of it."""
-_CALLS: Mapping[Language, Words] = {
+_CALLS: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(rf"^(?:and |but |now |as for |what about )*(?:the |my |that )?{MARK}:$"),
     "zh": re.compile(
         rf"^(?:至于|说到|而|那)?(?:[一]?[个只张把台块条本支])?(?:[\u4e00-\u9fff]{{1,4}}的)?{MARK}(?:呢|嘛|么|啊)?[，,]$"
