@@ -270,6 +270,19 @@ def test_a_person_plays_a_whole_task_to_success(page, serve, runs, tmp_path):
     )
 
 
+def test_a_type_counts_that_was_chosen_before_the_script_had_come(page, serve, tmp_path):
+    script = "**/choose.js*"
+    held = []
+    page.route(script, lambda route: held.append(route))
+    page.goto(f"{serve(tmp_path, play=tmp_path / 'played').address}/play", wait_until="commit")
+    page.select_option("select[name=type]", "single_search")
+    assert page.locator("select[name=task] option").count() > 100
+    (route,) = held
+    route.continue_()
+    page.wait_for_function("() => document.forms.choose.elements.task.length < 50")
+    assert page.input_value("select[name=type]") == "single_search"
+
+
 def begin_to_play(page: Any, shown: str) -> None:
     page.click("button.main")
     page.wait_for_selector(shown)

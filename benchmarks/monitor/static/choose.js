@@ -5,12 +5,12 @@ const form = document.getElementById("choose");
 if (form) {
   const { suite, type, task } = form.elements;
   let asked = 0;
-  form.addEventListener("change", async (event) => {
-    if (event.target !== suite && event.target !== type) return;
+  const choose = async (changed) => {
+    if (changed !== suite && changed !== type) return;
     const number = ++asked;
     task.replaceChildren(task.options[0]);  // what is chosen now holds at once
     task.value = "";
-    if (event.target === suite) type.value = "";
+    if (changed === suite) type.value = "";
     try {
       const answer = await fetch("/play?" + new URLSearchParams({ suite: suite.value, type: type.value }));
       const page = new DOMParser().parseFromString(await answer.text(), "text/html");
@@ -19,7 +19,7 @@ if (form) {
       // Each option that leaves its own list has been chosen there in its turn, so all of them are here.
       task.replaceChildren(...fresh.elements.task.children);
       task.value = "";
-      if (event.target === suite) {
+      if (changed === suite) {
         type.replaceChildren(...fresh.elements.type.children);
         type.value = "";
       }
@@ -27,5 +27,9 @@ if (form) {
     } catch (error) {
       // The server is away: the next task of the choice can still be begun once it is back.
     }
-  });
+  };
+  form.addEventListener("change", (event) => choose(event.target));
+  // What was chosen before this script had arrived, or was restored by the browser, changes nothing more.
+  const asServed = ({ options }) => [...options].find((option) => option.defaultSelected) ?? options[0];
+  choose([suite, type].find((select) => select.selectedOptions[0] !== asServed(select)));
 }

@@ -40,6 +40,9 @@ LOCAL_ENVIRONMENT = {
 }
 _JOIN_ENVIRONMENT = {"RAY_BACKEND_LOG_LEVEL": "error"}
 """Without lines of Ray's own beside er-gym's, which says the same."""
+_LEFT_BY_RAY = ("RAY_AUTH_MODE", "PYTHONBREAKPOINT")
+"""Variables that Ray sets and leaves: with the first, a process that is started later could not
+join a cluster without a password."""
 _JOIN_SECONDS = 120.0
 """In which Ray must have joined a cluster whose server has answered. It takes a few seconds, and
 more where this machine is busy or the code that travels has far to go."""
@@ -355,8 +358,8 @@ def _is_alive(process: int) -> bool:
 @contextlib.contextmanager
 def _environment(changes: Mapping[str, str]) -> Iterator[None]:
     """Environment variables for the length of a ``with`` statement; those that are set stay."""
-    mine = {name: value for name, value in changes.items() if name not in os.environ}
-    os.environ.update(mine)
+    mine = {name for name in (*changes, *_LEFT_BY_RAY) if name not in os.environ}
+    os.environ.update({name: value for name, value in changes.items() if name in mine})
     try:
         yield
     finally:

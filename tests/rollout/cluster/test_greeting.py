@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import subprocess
 import sys
@@ -112,7 +113,10 @@ def test_what_is_no_ray_is_refused_before_ray_is_imported(case, monkeypatch) -> 
 def test_a_process_ends_where_what_greets_does_not_answer() -> None:
     with server(sends(SETTINGS)) as port:
         command = [sys.executable, "-c", JOIN, f"127.0.0.1:{port}"]
-        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=200)
+        environment = {name: value for name, value in os.environ.items() if "RAY" not in name}
+        done = subprocess.run(
+            command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=200
+        )
     lines = [line for line in done.stderr.splitlines() if "RayUnavailable: " in line]
     assert len(lines) == 1, f"{done.returncode}: {done.stderr}"
     (told,) = lines

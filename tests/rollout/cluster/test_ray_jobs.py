@@ -32,11 +32,13 @@ ray = pytest.importorskip("ray", reason="Ray is not installed")
 
 @pytest.fixture(scope="module")
 def worker_backend():
+    before = dict(os.environ)
     with ray_backend(RaySettings(cpus=0.1, memory=2**28), print) as ours:
         folder = Path(ray._private.worker._global_node.get_temp_dir_path())
         assert folder.exists()
         yield ours
     assert not folder.exists()
+    assert dict(os.environ) == {**before, "PYTEST_CURRENT_TEST": os.environ["PYTEST_CURRENT_TEST"]}
     assert until(lambda: not any(_mentions(pid, folder) for pid in _descendants(os.getpid())))
 
 
