@@ -7,7 +7,7 @@ one thing ("The card?", "信用卡呢？") sets a topic: what follows speaks of 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from er_gym.data.mentions import Mention
@@ -105,9 +105,16 @@ class _Topic:
     sentence: int = -9
 
 
-def resolved(thought: Thought) -> Iterator[Clause]:
+def resolved(thought: Thought) -> Sequence[Clause]:
     """Clauses that speak of the one thing that was named before, with its name in the place of the
     pronoun."""
+    found: Sequence[Clause] | None = thought.kept.get("resolved")
+    if found is None:
+        found = thought.kept["resolved"] = [*_resolved(thought)]
+    return found
+
+
+def _resolved(thought: Thought) -> Iterator[Clause]:
     language = thought.known.language
     last: tuple[Mention, ...] = ()
     named_in = -1
