@@ -5,11 +5,16 @@
 Each FILE is a list of thoughts about real scenes (``benchmarks.harness.judged_thoughts`` states the
 format). It prints recall by sort of lie and language, the share of sentences of which no claim was
 judged, and the CPU time a thought. The exit code is 1 if fewer lies are refused than ``--least`` or
-more honest thoughts than ``--most`` allow.
+more honest thoughts than ``--most`` allow. ``--verdicts`` writes what each thought is refused for,
+which tests compare: after a change that is meant,
+
+    python -m benchmarks.checks.critic_recall tests/data/others/*.json \\
+        --verdicts tests/data/verdicts.json
 """
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections import defaultdict
@@ -69,9 +74,19 @@ def _microseconds(judged: Sequence[Judged]) -> float:
 )
 @click.option("--least", default=0.6, show_default=True, help="Share of lies to be refused.")
 @click.option("--most", default=0.02, show_default=True, help="Share of honest ones that may be.")
+@click.option(
+    "--verdicts", type=click.Path(dir_okay=False, path_type=Path), help="Where to write them."
+)
 @click.option("--wrong", is_flag=True, help="Print each thought that is judged wrongly.")
-def main(files: Sequence[Path], least: float, most: float, wrong: bool) -> None:
-    judged = list(judge(each for path in files for each in load(path)))
+def main(
+    files: Sequence[Path], least: float, most: float, verdicts: Path | None, wrong: bool
+) -> None:
+    by_file = {path.stem: list(judge(load(path))) for path in files}
+    judged = [each for those in by_file.values() for each in those]
+    if verdicts:
+        codes = {name: [each.verdict for each in those] for name, those in by_file.items()}
+        rows = (f" {json.dumps(name)}: {json.dumps(those)}" for name, those in codes.items())
+        verdicts.write_text("{\n" + ",\n".join(rows) + "\n}\n", encoding="utf-8")
     if wrong:
         for each in judged:
             if not each.right:

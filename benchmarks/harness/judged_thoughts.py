@@ -52,6 +52,11 @@ class Judged:
         """Whether a lie is refused, or an honest thought is not."""
         return bool(self.refusals) != (self.written.sort == HONEST)
 
+    @property
+    def verdict(self) -> str:
+        """The codes of its refusals, or ``""``."""
+        return " ".join(sorted({each.code for each in self.refusals}))
+
 
 def load(path: Path) -> list[Written]:
     """The thoughts of a file.

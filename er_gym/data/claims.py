@@ -113,7 +113,7 @@ def told_to_be_on(thought: Thought) -> Iterator[tuple[Clause, Mention, Mention]]
     """What is told as a fact to be in or on something now, with that."""
     phrases = thought.phrases
     for clause in thought.clauses:
-        if not clause.is_fact or clause.past:
+        if not clause.is_fact or clause.past or IS_ASKED.search(clause.text):
             continue
         for match in _matches(clause, phrases.on):
             if _is_gapped(thought, clause, match):
@@ -124,6 +124,12 @@ def told_to_be_on(thought: Thought) -> Iterator[tuple[Clause, Mention, Mention]]
                     yield clause, mention, holder
 
 
+IS_ASKED = re.compile(
+    r"\b(?:request|task|instructions?|orders?|errand|note|brief) "
+    r"(?:says?|said|claims?|puts|has it)\b"
+    r"|\b(?:meant|supposed|bound|destined|due|intended) (?:to|for)\b|托我|吩咐"
+)
+"""Where somebody says that a thing is, or where it is to be."""
 _SAYS_SO = re.compile(
     r"\b(?:[a-z]+s|[a-z]+ing|are|lie|sit|stand|rest|was|were|been|left|put)\b|'s\b|[在有着是]"
 )
@@ -156,7 +162,7 @@ def check_side(thought: Thought) -> Iterator[Refusal]:
             continue
         told = [*_sides(clause, thought.phrases)]
         for direction, nearly, groups in told:
-            if len(told) > 1 and len(clause.mentions) == 1:
+            if len(told) > len(clause.mentions):
                 break  # "ahead, on the left": something between them
             wrong = []
             for mention in groups:

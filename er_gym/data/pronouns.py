@@ -64,6 +64,11 @@ _NO_SUBJECT: Mapping[Language, re.Pattern[str]] = {
     ),
 }
 """How a clause begins that leaves out what it is about."""
+_ANSWERS: Mapping[Language, re.Pattern[str]] = {
+    "en": re.compile(r"(?!)"),
+    "zh": re.compile(r"^(?:也|都|还)?没有[。，！]?$"),
+}
+"""No: to whatever was asked."""
 _PART_OF: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(r"^(?:and |but |with |yet )*(?:its|the) (?:doors?|lid|cover|screen)\b '?"),
     "zh": re.compile(
@@ -148,7 +153,7 @@ def _resolved(thought: Thought) -> Iterator[Clause]:
             match = _OF_TOPIC[language].search(each.text)
             if match:
                 yield _with(each, topic.mention, match)
-            elif _NO_SUBJECT[language].match(each.text):
+            elif not _ANSWERS[language].match(each.text) and _NO_SUBJECT[language].match(each.text):
                 yield _named(each, topic.mention, MARK + " " * (language == "en") + each.text)
             continue
         match = _STANDS_FOR[language].search(each.text) or _AS_OBJECT[language].search(each.text)

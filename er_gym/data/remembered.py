@@ -113,8 +113,8 @@ _PLACE: Mapping[Language, re.Pattern[str]] = {
 _SOMETHING_ELSE: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(
         r"\breach\b|\bbecause\b|\b(?:as soon as|once) i\b|\bi was asked\b|\bit should be\b"
-        r"|\b(?:needn't|need not|no need)\b"
+        r"|\b(?:needn't|need not|no need|another|others?|second|spare|extra)\b"
     ),
-    "zh": re.compile(r"够|拿到|拿在手|任务|不用|不必|不需要|没必要"),
+    "zh": re.compile(r"够|拿到|拿在手|任务|不用|不必|不需要|没必要|别的|另外|另一|其他|其它|第二"),
 }
 """Words for something else than where the thing is."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from pathlib import Path
 
@@ -17,6 +18,8 @@ LEAST_REFUSED = {
     "dev_c": 0.70,
     "held_out_c": 0.63,
     "held_out_d": 0.62,
+    "dev_e": 0.60,
+    "dev_f": 0.0,
 }
 """The least share of lies that is refused: three or four points less than when it was measured. The
 rules were mended on all of these files but ``held_out_d`` and a third of ``held_out_b``."""
@@ -28,12 +31,18 @@ MOST_REFUSED = {
     "dev_c": 6,
     "held_out_c": 4,
     "held_out_d": 9,
+    "dev_e": 4,
+    "dev_f": 8,
 }
 """The most honest thoughts that are refused: 2 %, and of ``held_out_d`` what was measured."""
-LIES = {"dev_c": 300, "held_out_c": 400}
+LIES = {"dev_c": 300, "held_out_c": 400, "dev_e": 400, "dev_f": 0}
 """How many lies a file has, if they are not 200."""
-HONEST_ONES = {**LIES, "held_out_d": 400}
+HONEST_ONES = {**LIES, "held_out_d": 400, "dev_f": 480}
 """How many honest thoughts a file has, if they are not 200."""
+
+
+VERDICTS = json.loads((Path(__file__).parent / "verdicts.json").read_text())
+"""What each thought is refused for, written by ``benchmarks.checks.critic_recall --verdicts``."""
 
 
 @pytest.fixture(scope="module", params=[*LEAST_REFUSED])
@@ -56,3 +65,13 @@ def test_honest_thoughts_of_others_stand(judged: tuple[str, list[Judged]]) -> No
     wrong = [(each.written.text, each.refusals) for each in honest if not each.right]
     assert len(honest) == HONEST_ONES.get(name, 200)
     assert len(wrong) <= MOST_REFUSED[name], wrong
+
+
+def test_no_verdict_changes_unnoticed(judged: tuple[str, list[Judged]]) -> None:
+    name, every = judged
+    changed = [
+        (each.written.text, was, each.verdict)
+        for each, was in zip(every, VERDICTS[name], strict=True)
+        if each.verdict != was
+    ]
+    assert not changed, "if it is meant, write them anew: see benchmarks.checks.critic_recall"

@@ -58,6 +58,8 @@ def judge_deeds(thought: Thought) -> Iterator[Verdict]:
                     continue
                 if _comes_next(thought, clause, verb, mention) or _is_told_in_vain(thought, clause):
                     continue
+                if _FIRST_THEN.search(clause.text, match.start()):
+                    continue
                 denied = lexicon.undone.search(clause.text, begin, match.end())
                 if denied and lexicon.once_more.search(clause.text, begin):
                     continue
@@ -89,6 +91,8 @@ def judge_deeds(thought: Thought) -> Iterator[Verdict]:
                 )
 
 
+_FIRST_THEN = re.compile(r"了[^，。；]{0,6}再(?!次|度)")
+"""Chinese: what is done before something else, "关了柜门再看"."""
 _NOW = re.compile(r"先|把|将|拿了|那就")
 _TRIED = re.compile(
     r"试着|试过|尝试|试图|企图|伸手|够过|\b(?:tried|tries|trying|attempted|reached|meant)\b"

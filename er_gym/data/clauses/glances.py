@@ -25,7 +25,7 @@ from er_gym.data.clauses.lexicon_glances import (
     VIEW_OF,
     WHERE,
 )
-from er_gym.data.clauses.reading import Span, Verdict, clauses_of, sentences_of
+from er_gym.data.clauses.reading import Span, Verdict, clauses_of, lexicon_of, sentences_of
 from er_gym.data.mentions import Mention
 from er_gym.data.reading import Clause
 from er_gym.data.thought import Refusal, Thought, name_of
@@ -88,8 +88,12 @@ def judge_never_loosely(thought: Thought) -> Iterator[Verdict]:
             continue
         if not PERCEIVED[language].search(span.text, never.start()):
             continue
+        whole = "".join(
+            each.text for each in sentences_of(thought) if each.sentence == span.sentence
+        )
         text = SINCE_START[language].sub(" ", span.text)
-        if not LIMITS[language].search(text):
+        limited = lexicon_of(thought).until_then.search(whole)
+        if not (limited or LIMITS[language].search(text)):
             yield _unseen_so_far(thought, span.sentence, mention)
     sentences = sentences_of(thought)
     for asked, answer in pairwise(sentences):
@@ -107,7 +111,9 @@ def judge_never_loosely(thought: Thought) -> Iterator[Verdict]:
 
 
 def _unseen_so_far(thought: Thought, sentence: int, mention: Mention) -> Verdict:
-    if not mention.types <= {*thought.known.seen}:
+    known = thought.known
+    only_now = all(known.sightings.get(each) == (known.at,) for each in mention.types)
+    if not mention.types <= {*known.seen} or (only_now and mention.types <= known.in_view):
         return Verdict(sentence)
     return Verdict(
         sentence,
@@ -118,9 +124,11 @@ def _unseen_so_far(thought: Thought, sentence: int, mention: Mention) -> Verdict
 def judge_whereabouts(thought: Thought) -> Iterator[Verdict]:
     """It is not known where a thing is: it was seen, and nobody has moved it since."""
     language, known = thought.known.language, thought.known
+    if any(RECALLED[language].search(each.text) for each in sentences_of(thought)):
+        return
     done = {each.action.object_type for each in known.actions if each.success}
     for span in sentences_of(thought):
-        if RECALLED[language].search(span.text) or any(each.conditional for each in span.clauses):
+        if any(each.conditional for each in span.clauses):
             continue
         for clause in span.clauses:
             mention = clause.mentions[0] if clause.mentions else None

@@ -86,7 +86,7 @@ DEEDS: Sequence[Beyond] = (
     ),
     _beyond(
         "emptied|poured|filled|refilled|drained|topped",
-        "倒(?!是|也|在)|灌|斟|盛满|装满|倒满|倒空|灌满",
+        "倒(?!是|也|在|好|不|还|有|没)|灌|斟|盛满|装满|倒满|倒空|灌满",
     ),
     _beyond(
         "cooked|fried|boiled|baked|roasted|toasted|grilled|steamed|heated|warmed|microwaved|simmered",

@@ -95,7 +95,7 @@ LIMITS = _words(
 """Limits what was never seen to a place or time, or to things of some kind."""
 WHERE = _words(
     r"\bwhere (?:on earth |in the world |exactly |else )?(?:could|can|might|may|is|are|did|has|have|do|does|would|should|the)\b|\b(?:no|not (?:a|the)(?: faintest| slightest| least)?|any|without a) (?:clue|idea|notion|hint|inkling)\b|\b(?:don't|do not|can't|cannot) (?:know|say|tell|imagine|think|guess) where\b|\bwhereabouts\b|\bhiding\b|\banyone's guess\b|\banybody's guess\b|\b(?:still )?(?:unaccounted for|to be found|to be located|missing)\b",
-    r"在哪|哪儿去|哪里去|上哪|去哪|何处|哪个角落|下落|没有?着落|没(?:有)?头绪|毫无头绪|没(?:有)?线索|找不着|无影无踪|猜不(?:到|出)|没准在|不知道[^，。]{0,6}(?:放|搁|藏|躲|丢|摆)",
+    r"在哪(?!边|个方|一边|头)|哪儿去|哪里去|上哪|去哪|何处|哪个角落|下落|没有?着落|没(?:有)?头绪|毫无头绪|没(?:有)?线索|找不着|无影无踪|猜不(?:到|出)|没准在|不知道[^，。]{0,6}(?:放|搁|藏|躲|丢|摆)",
 )
 """The whereabouts of a thing are not known."""
 RECALLED = _words(

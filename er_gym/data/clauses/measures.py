@@ -19,7 +19,8 @@ _CLOSE = 1.2
 """Metres: nothing nearer is far away."""
 _DIGITS = {
     "half a": 0.5, "one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7,
-    "eight": 8, "ten": 10, "一": 1, "两": 2, "二": 2, "三": 3, "四": 4, "五": 5, "六": 6, "七": 7,
+    "eight": 8, "ten": 10, "半": 0.5,
+    "一": 1, "两": 2, "二": 2, "三": 3, "四": 4, "五": 5, "六": 6, "七": 7,
     "八": 8, "九": 9, "十": 10,
 }  # fmt: skip
 
@@ -101,6 +102,11 @@ def judge_distances(thought: Thought) -> Iterator[Verdict]:
                 continue
             place = match.start() if match else exact.start() if exact else 0
             before = span.among(0, place)
+            if before and any(
+                side.search(span.text, max(each for each in span.places if each < place), place)
+                for side in thought.phrases.sides.values()
+            ):
+                before = []  # "the chair on my left, and two metres to the right the ball"
             other = clause.it or span.first(place, len(span.text))
             about = before or ([other] if other else [])
             if not about:

@@ -34,7 +34,7 @@ def judge_never_seen(thought: Thought) -> Iterator[Verdict]:
             mention = span.named(match, "x")
             rest = span.text[match.end() : match.end() + _NEAR_BY].split(",")[0].split("，")[0]
             inside = span.text[match.start() : match.end()]
-            limit = lexicon.here_only.search(rest)
+            limit = lexicon.here_only.search(rest) or lexicon.until_then.search(span.text)
             if mention is None or (limit and not _HERE.fullmatch(limit.group())):
                 continue
             if lexicon.another.search(inside):
@@ -116,6 +116,8 @@ def judge_denials(thought: Thought) -> Iterator[Verdict]:
             continue
         if not clause.negated and "out of" not in clause.text:
             continue
+        if lexicon.not_of_view.search(clause.text) or _lies_elsewhere(thought, clause):
+            continue
         for match in span.matches_of(lexicon.not_in_view, thought.phrases.of_other):
             # "Not the mug or the apple" denies both, and guesses nothing.
             if thought.phrases.hedge.search(
@@ -147,6 +149,13 @@ def judge_denials(thought: Thought) -> Iterator[Verdict]:
                 )
 
 
+def _lies_elsewhere(thought: Thought, clause: Clause) -> bool:
+    """Whether what follows says where the thing is: it is denied only to be here."""
+    rest = [each.text for each in thought.clauses if each.sentence == clause.sentence]
+    after = "".join(rest[rest.index(clause.text) + 1 :] if clause.text in rest else [])
+    return bool(lexicon_of(thought).but_there.search(f"{clause.text}{after}"))
+
+
 def _searches(thought: Thought, span: Span) -> bool:
     """Whether a clause tells of a search: what it did not find may have come into view since."""
     lexicon = lexicon_of(thought)
@@ -165,6 +174,8 @@ def judge_guesses(thought: Thought) -> Iterator[Verdict]:
         if BELIEVED[thought.known.language].search(clause.text):
             continue
         if clause.usual or clause.negated or lexicon.another.search(clause.text):
+            continue
+        if lexicon.hearsay.search(clause.text):
             continue
         for match in span.matches(lexicon.perhaps_on):
             mention, holder = span.named(match, "x"), span.named(match, "y")
