@@ -292,7 +292,9 @@ def _fits(thought: Thought, decided: Decided) -> bool:
     if act == "go" and decided.thing is None:
         return verb == verbs.NAVIGATE
     if act in ("go", "visit"):
-        return same and verb in (verbs.NAVIGATE, verbs.OPEN, verbs.PICKUP, verbs.TOGGLE)
+        lies_there = any(target in known.rested.get(each, ()) for each in things)
+        begins = (verbs.NAVIGATE, verbs.OPEN, verbs.PICKUP, verbs.TOGGLE)
+        return (same or lies_there) and verb in begins
     if act == "check":
         return same and verb in (verbs.NAVIGATE, verbs.OPEN)
     if act == "open":

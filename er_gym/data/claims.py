@@ -113,7 +113,7 @@ def told_to_be_on(thought: Thought) -> Iterator[tuple[Clause, Mention, Mention]]
     """What is told as a fact to be in or on something now, with that."""
     phrases = thought.phrases
     for clause in thought.clauses:
-        if not clause.is_fact or clause.past or IS_ASKED.search(clause.text):
+        if not clause.is_fact or clause.past or clause.wanted or _IS_ASKED.search(clause.text):
             continue
         for match in _matches(clause, phrases.on):
             if _is_gapped(thought, clause, match):
@@ -124,7 +124,7 @@ def told_to_be_on(thought: Thought) -> Iterator[tuple[Clause, Mention, Mention]]
                     yield clause, mention, holder
 
 
-IS_ASKED = re.compile(
+_IS_ASKED = re.compile(
     r"\b(?:request|task|instructions?|orders?|errand|note|brief) "
     r"(?:says?|said|claims?|puts|has it)\b"
     r"|\b(?:meant|supposed|bound|destined|due|intended) (?:to|for)\b|托我|吩咐"
@@ -160,6 +160,8 @@ def check_side(thought: Thought) -> Iterator[Refusal]:
     for clause in (*thought.clauses, *resolved(thought)):
         if not clause.mentions or clause.guessed or clause.negated or clause.past:
             continue
+        if _TURNS_ROUND.search(_sentence_of(thought, clause)):
+            continue
         told = [*_sides(clause, thought.phrases)]
         for direction, nearly, groups in told:
             if len(told) > len(clause.mentions):
@@ -181,6 +183,17 @@ def check_side(thought: Thought) -> Iterator[Refusal]:
                 wrong.append("" if fits else f"{name_of(mention)} is {_directions(places)}")
             if wrong and all(wrong):
                 yield Refusal("side", f"{wrong[0]}, not {_directions({direction})}.")
+
+
+_TURNS_ROUND = re.compile(
+    r"\b(?:i|having|after) (?:just |then |have |had )*turn(?:ed|ing)?\b|\bdead ahead, there"
+    r"|(?:往|朝|向)(?:身后|后|左|右)[^，。]{0,2}看|回头|转过?身|转头|掉头"
+)
+"""Who turns says on which side things are then."""
+
+
+def _sentence_of(thought: Thought, clause: Clause) -> str:
+    return "".join(each.text for each in thought.clauses if each.sentence == clause.sentence)
 
 
 _WIDE = frozenset(
@@ -373,14 +386,18 @@ def _sides(clause: Clause, phrases: Phrases) -> Iterator[tuple[str, bool, list[M
         leading = not clause.among(0, found[0][0]) or (
             phrases.is_so.match(clause.text, end) and clause.among(end, stop)
         )
-        if leading:
+        if _SHUTS.search(clause.text, 0, start):
+            continue  # "I closed it behind me"
+        if leading or clause.text.startswith("的", end):
+            if _NAMELESS.fullmatch(clause.text[begin:start]) and clause.text[end : end + 1] == ",":
+                continue  # "pen straight ahead, the card …": a thing whose name is not known
             for place, mention in _pairs(clause, end, stop):
                 if not phrases.of_other.search(clause.text[end:place]):
                     yield direction, nearly, [mention]
                     break
         else:
             nearest = list(_pairs(clause, begin, start))
-            if nearest:
+            if nearest and not _OTHER_THING.search(clause.text, nearest[-1][0] + 1, start):
                 own = [
                     mention
                     for place, mention in nearest
@@ -390,6 +407,19 @@ def _sides(clause: Clause, phrases: Phrases) -> Iterator[tuple[str, bool, list[M
                     own += [mention for _, mention in list(_pairs(clause, end, stop))[:1]]
                 if own:  # else something without a name is there
                     yield direction, nearly, [nearest[-1][1], *own[-2:]]
+
+
+_NAMELESS = re.compile(
+    r"\W*(?:(?!(?:and|but|so|now|well|still|yet|just|there|here|then|is|are)\b)"
+    r"[a-z-]+ ){1,2}"
+)
+"""English: a thing without a name that is known."""
+_SHUTS = re.compile(r"\b(?:clos|shut|pull)[a-z]* (?:it|them|the [a-z]+|§)(?: shut| to| closed)? $")
+"""Before "behind me", it says no side."""
+_OTHER_THING = re.compile(
+    r",(?! (?:which|and|but|just|still|it|right|only|over|back|there)\b) [a-z]+ "
+)
+"""English: after a name, a further thing without one: "the mug, a thing on the left"."""
 
 
 def _pairs(clause: Clause, start: int, end: int) -> Iterator[tuple[int, Mention]]:

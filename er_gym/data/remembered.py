@@ -48,9 +48,10 @@ def check_remembered(thought: Thought) -> Iterator[Refusal]:
     if any(_RECALLS[known.language].search(each.text) for each in thought.clauses):
         return  # it says so itself
     names = all_interchangeable([known.sought])
+    whole = " ".join(each.text for each in thought.clauses)
     for clause in thought.clauses:
         about = any(each.types & names for each in clause.mentions)
-        if about and _guesses(clause, known.language):
+        if about and _guesses(clause, known.language) and not HEARD[known.language].search(whole):
             where = known.where(known.sought)
             yield Refusal(
                 "remembered",
@@ -83,6 +84,11 @@ _RECALLS: Mapping[Language, re.Pattern[str]] = {
     ),
 }
 """Words of one who remembers."""
+HEARD: Mapping[Language, re.Pattern[str]] = {
+    "en": re.compile(r"\b(?:they say|supposedly|reportedly|allegedly|i was told)\b"),
+    "zh": re.compile(r"据说|听说|据称|说是"),
+}
+"""Words of one who repeats what others say."""
 BELIEVED: Mapping[Language, re.Pattern[str]] = {
     "en": re.compile(
         r"\bi(?:'d| had)? (?:thought|expected|assumed|figured|hoped|imagined|believed)\b"

@@ -15,12 +15,14 @@ KINDS = generated_types()
 
 @dataclass
 class Room:
-    """Makes ten tasks of each type."""
+    """Makes ten tasks of each type, or one of those that are rare."""
+
+    rare: frozenset[str] = frozenset()
 
     def tasks(self, types=()):
         for kind in KINDS:
             if kind.name in types:
-                for number in range(10):
+                for number in range(1 if kind.name in self.rare else 10):
                     yield Task(f"{kind.name}-{number}", kind, "House1-0", "", ())
 
 
@@ -48,6 +50,23 @@ def test_all_tasks_are_played_or_enough_of_enough_types():
     done = houses.tasks_done(Room(), verify, 6, enough=30)
     assert done == {kind.name: 6 for kind in KINDS[:7]}
     assert len(verify.asked) == 6 * len(KINDS)  # seven types are not enough
+    first, *others = (kind.name for kind in KINDS)
+    done = houses.tasks_done(Room(frozenset({first})), Verdicts(), 6)
+    assert done == {first: 1} | dict.fromkeys(others, 6)  # a type that runs out ends no other
+
+
+def test_houses_that_fall_short_are_named():
+    types = {kind.name: 4 for kind in KINDS[: houses.TYPES]}
+    every = {
+        name: houses.House(name=name, rooms=1, seconds=0.1, played=0.1, done=done)
+        for name, done in (
+            ("enough", types),
+            ("few", dict.fromkeys(types, 3)),
+            ("of few types", {KINDS[0].name: 90}),
+        )
+    }
+    every["not played"] = houses.House(name="not played", rooms=1, seconds=0.1)
+    assert [line.split(":")[0] for line in houses._short(every, 30)] == ["few", "of few types"]
 
 
 def test_the_same_command_goes_on_where_it_was_killed(tmp_path, monkeypatch):

@@ -22,7 +22,7 @@ _FUTURE = re.compile(r"\b(?:will|shall|can|could|should|going to|need to|have to
 _AFTERWARDS = re.compile(r"\b(?:after|once|when|by the time|as soon as)\b[^,§]*$")
 _OF_ANY = re.compile(r"\bany\b|\bsingle\b|\bone of\b|\ba\b|一个|任何|哪个|从")
 _OF_SOME = re.compile(r"s? (?:of (?:this|these|the)|here|on this|in this)\b")
-_BEFORE = 5
+_BEFORE = 13
 """Letters before a deed in which what denies it stands."""
 
 
@@ -308,7 +308,7 @@ def judge_answers(thought: Thought) -> Iterator[Verdict]:
 
 _AT = re.compile(r"(?:\b(?:by|near|beside|at)(?: (?:the|that|this|my))?(?: [a-z-]+)? |[在到])$")
 _CANNOT_TELL = re.compile(
-    r"(?:\b(?:nobody|no one|nothing|can|could|will|would|might|won't)\b[^,.;]{0,12}"
+    r"(?:\b(?:nobody|no one|nothing|can|could|will|would|may|might|won't)\b[^,.;]{0,12}"
     r"|(?:没谁|没人|没有谁|没有人|无人|谁|能|会|可以|等)[^，。；]{0,3})$"
 )
 """Before an answer: none was given."""

@@ -63,7 +63,6 @@ class Lexicon:
         not_in_view: none of ``xs`` is in view.
         not_of_view: what is denied is something else than that a thing is in view.
         but_there: a thing is not here but in another place.
-        hearsay: what others say.
         until_then: limits what was never seen to the time before something.
         not_on: ``x`` is not on ``y``, which is in view.
         perhaps_on: ``x`` is in or on ``y``, after a guess.
@@ -132,7 +131,6 @@ class Lexicon:
     not_in_view: Sequence[Words]
     not_of_view: Words
     but_there: Words
-    hearsay: Words
     until_then: Words
     not_on: Sequence[Words]
     perhaps_on: Sequence[Words]

@@ -281,7 +281,6 @@ LEXICON = Lexicon(
     ),
     not_of_view=re.compile(r"\bin (?:my|the) hands?\b"),
     but_there=re.compile(r"(?!)"),
-    hearsay=re.compile(r"\b(?:supposedly|reportedly|allegedly)\b"),
     until_then=re.compile(r"\b(?:before|until|till) (?:i|we)\b|\bby the time\b"),
     not_on=(
         re.compile(rf"\b(?:no|not a|not a single|without a|isn't a|is not a|isn't any|see no) {_D}{_X} (?:on|in|inside|on top of) {_D}{_Y}"),
@@ -339,6 +338,6 @@ LEXICON = Lexicon(
         re.compile(rf"\bevery one of {_D}{_Y} is\b"),
     ),
     shut=re.compile(rf"\b(?:closed|shut|unopened|never-opened|untouched) {MARK}|{MARK},? (?:that |which )?(?:i(?:'ve| have)? (?:never|not|n't|haven't)(?: yet| even)? (?:opened|touched|looked (?:in|into)|checked)|i haven't (?:opened|touched|looked into|checked)|(?:was|is|has been) never opened|nobody has opened)"),
-    ignorance=re.compile(r"\b(?:don't know|do not know|can't (?:tell|say|know|be sure)|cannot (?:tell|say|know|be sure)|no idea|anybody's guess|anyone's guess|who knows|unknown|no telling|hard to say|wonder|remains to be seen|i'll see|let me see|find out)\b"),
+    ignorance=re.compile(r"\b(?:don't know|do not know|can't (?:tell|say|know|be sure)|cannot (?:tell|say|know|be sure)|no idea|anybody's guess|anyone's guess|who knows|unknown|no telling|hard to say|wonder|remains to be seen|mystery|secret|i'll see|let me see|find out)\b"),
 )  # fmt: skip
 """English."""

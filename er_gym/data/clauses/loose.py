@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator
 
 from er_gym.data.action_claims import has_done
-from er_gym.data.claims import IS_ASKED, is_placing, not_on
+from er_gym.data.claims import is_placing, not_on
 from er_gym.data.clauses.lexicon_beyond import NEVER_ANSWERED
 from er_gym.data.clauses.lexicon_loose import (
     ANSWERED,
@@ -129,8 +129,7 @@ def judge_lies_loosely(thought: Thought) -> Iterator[Verdict]:
                 continue
             if (k and _joins(span, k)) or is_placing(clause, begin - 1, thought.phrases):
                 continue
-            before = span.text[: begin - 1]
-            if thought.phrases.of_other.search(before) or IS_ASKED.search(before):
+            if thought.phrases.of_other.search(span.text[: begin - 1]):
                 continue
             wrong = not_on(thought, thing, holder)
             if wrong:

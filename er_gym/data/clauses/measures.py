@@ -102,11 +102,6 @@ def judge_distances(thought: Thought) -> Iterator[Verdict]:
                 continue
             place = match.start() if match else exact.start() if exact else 0
             before = span.among(0, place)
-            if before and any(
-                side.search(span.text, max(each for each in span.places if each < place), place)
-                for side in thought.phrases.sides.values()
-            ):
-                before = []  # "the chair on my left, and two metres to the right the ball"
             other = clause.it or span.first(place, len(span.text))
             about = before or ([other] if other else [])
             if not about:

@@ -9,7 +9,7 @@ from er_gym.data.claims import is_given, is_placing, not_on
 from er_gym.data.clauses.reading import Span, Verdict, clauses_of, is_told, lexicon_of, sentences_of
 from er_gym.data.mentions import Mention, all_interchangeable
 from er_gym.data.reading import Clause
-from er_gym.data.remembered import BELIEVED
+from er_gym.data.remembered import BELIEVED, HEARD
 from er_gym.data.thought import Refusal, Thought, name_of
 from er_gym.tasks import verbs
 from er_gym.thor import OBJECT_TYPES
@@ -175,7 +175,7 @@ def judge_guesses(thought: Thought) -> Iterator[Verdict]:
             continue
         if clause.usual or clause.negated or lexicon.another.search(clause.text):
             continue
-        if lexicon.hearsay.search(clause.text):
+        if HEARD[thought.known.language].search(clause.text):
             continue
         for match in span.matches(lexicon.perhaps_on):
             mention, holder = span.named(match, "x"), span.named(match, "y")
