@@ -20,7 +20,7 @@ pytest_plugins = ["episodes_by_hand"]
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# pytest-xdist runs a process per core and one more; torch would start a thread per core in each of
+# pytest-xdist runs a process per core and two more; torch would start a thread per core in each of
 # them, and in each process that a test starts. Libraries read these variables at their import.
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -31,7 +31,7 @@ fork_workers()
 
 def pytest_xdist_auto_num_workers() -> int:
     """A sixth of the time of the tests is spent in waiting for processes, servers and browsers."""
-    return (os.cpu_count() or 1) + 1
+    return (os.cpu_count() or 1) + 2
 
 
 @pytest.hookimpl(wrapper=True)
