@@ -160,7 +160,7 @@ def check_side(thought: Thought) -> Iterator[Refusal]:
     for clause in (*thought.clauses, *resolved(thought)):
         if not clause.mentions or clause.guessed or clause.negated or clause.past:
             continue
-        if _TURNS_ROUND.search(_sentence_of(thought, clause)):
+        if _TURNS_ROUND.search(thought.sentences[clause.sentence]):
             continue
         told = [*_sides(clause, thought.phrases)]
         for direction, nearly, groups in told:
@@ -190,10 +190,6 @@ _TURNS_ROUND = re.compile(
     r"|(?:往|朝|向)(?:身后|后|左|右)[^，。]{0,2}看|回头|转过?身|转头|掉头"
 )
 """Who turns says on which side things are then."""
-
-
-def _sentence_of(thought: Thought, clause: Clause) -> str:
-    return "".join(each.text for each in thought.clauses if each.sentence == clause.sentence)
 
 
 _WIDE = frozenset(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 from typing import Any
 
 from er_gym.data.knowledge import Knowledge
@@ -58,6 +59,15 @@ class Thought:
     def parts(self) -> tuple[Clause, ...]:
         """The clauses, split further by polarity."""
         return tuple(part for each in self.clauses for part in parts_of(each, self.phrases))
+
+    @cached_property
+    def sentences(self) -> Mapping[int, str]:
+        """The text of each sentence, as its clauses have it."""
+        between = "" if self.known.language == "zh" else " "
+        return {
+            number: between.join(each.text for each in clauses)
+            for number, clauses in groupby(self.clauses, lambda each: each.sentence)
+        }
 
     @cached_property
     def kept(self) -> dict[str, Any]:

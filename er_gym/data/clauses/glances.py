@@ -88,11 +88,8 @@ def judge_never_loosely(thought: Thought) -> Iterator[Verdict]:
             continue
         if not PERCEIVED[language].search(span.text, never.start()):
             continue
-        whole = "".join(
-            each.text for each in sentences_of(thought) if each.sentence == span.sentence
-        )
         text = SINCE_START[language].sub(" ", span.text)
-        limited = lexicon_of(thought).until_then.search(whole)
+        limited = lexicon_of(thought).until_then.search(thought.sentences[span.sentence])
         if not (limited or LIMITS[language].search(text)):
             yield _unseen_so_far(thought, span.sentence, mention)
     sentences = sentences_of(thought)

@@ -113,7 +113,7 @@ def _sentences(thought: Thought) -> Iterator[Span]:
     for each in thought.clauses:
         groups.setdefault(each.sentence, []).append(each)
     for number, clauses in groups.items():
-        text = ("" if thought.known.language == "zh" else " ").join(each.text for each in clauses)
+        text = thought.sentences[number]
         mentions = tuple(one for each in clauses for one in each.mentions)
         places = tuple(at for at, letter in enumerate(text) if letter == MARK)
         yield Span(text, mentions, places, number, tuple(clauses))

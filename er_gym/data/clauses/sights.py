@@ -248,7 +248,7 @@ def judge_contents(thought: Thought) -> Iterator[Verdict]:
     for clause, span in clauses_of(thought):
         if not is_told(clause) or clause.intended or clause.past or clause.wanted:
             continue
-        if lexicon.ignorance.search(_whole(thought, clause)):
+        if lexicon.ignorance.search(thought.sentences[clause.sentence]):
             continue
         for match in span.matches(lexicon.contents):
             holder = span.named(match, "y")
@@ -268,11 +268,6 @@ def judge_contents(thought: Thought) -> Iterator[Verdict]:
                     "opened. Say what may be there, or leave it out.",
                 ),
             )
-
-
-def _whole(thought: Thought, clause: Clause) -> str:
-    """The sentence that a clause is of."""
-    return next(each.text for each in sentences_of(thought) if each.sentence == clause.sentence)
 
 
 _TOUCHED = (verbs.OPEN, verbs.CLOSE, verbs.PUT)
