@@ -322,8 +322,7 @@ def _reinforce(
         if row.values:
             episodes, continued = with_values(samplers["play"], played, settings, seed)
         at_learning = time.monotonic()
-        for sampler in samplers.values():
-            sampler.client.forget()  # it is of no more use, and learning needs memory
+        _forget(samplers["play"])
 
         # advantages: each group by itself, then tokens
         begin(f"learning: update {update:,} of {training.updates:,}")
@@ -498,12 +497,19 @@ def _validated(sampler: Sampler, tasks: Sequence[Task]) -> dict[str, float]:
     """Success by the likeliest tokens, and why episodes ended, of all processes."""
     jobs = group_jobs(tasks, 1, lambda key: _seed(0, 0, key))
     records = [episode.record for _, episode, _ in sampler.play(jobs)]
+    _forget(sampler)
     found = gather_object([(each.success, each.end_reason) for each in records])
     ended = Counter(reason for _, reason in found)
     return {
         "validation/success": fmean(done for done, _ in found),
         **{f"validation/ended/{name}": n / len(found) for name, n in sorted(ended.items())},
     }
+
+
+def _forget(sampler: Sampler) -> None:
+    """Drop what was computed for conversations: the weights change, and learning needs memory."""
+    sampler.client.forget()
+    machine.give_memory_back()
 
 
 def _with_best(
