@@ -186,7 +186,7 @@ def check_side(thought: Thought) -> Iterator[Refusal]:
 
 
 _TURNS_ROUND = re.compile(
-    r"\b(?:i|having|after) (?:just |then |have |had )*turn(?:ed|ing)?\b|\bdead ahead, there"
+    r"\b(?:i|having|after) (?:just |then |have |had )*turn(?:ed|ing)?\b"
     r"|(?:往|朝|向)(?:身后|后|左|右)[^，。]{0,2}看|回头|转过?身|转头|掉头"
 )
 """Who turns says on which side things are then."""
