@@ -25,6 +25,7 @@ import click
 
 from benchmarks.harness.judged_thoughts import HONEST, LIMIT, Judged, judge, load
 from er_gym.data.critic import check, review
+from er_gym.writing.atomic import write_atomic
 
 _LANGUAGES = ("en", "zh")
 _ROUNDS = 5
@@ -86,7 +87,7 @@ def main(
     if verdicts:
         codes = {name: [each.verdict for each in those] for name, those in by_file.items()}
         rows = (f" {json.dumps(name)}: {json.dumps(those)}" for name, those in codes.items())
-        verdicts.write_text("{\n" + ",\n".join(rows) + "\n}\n", encoding="utf-8")
+        write_atomic(verdicts, "{\n" + ",\n".join(rows) + "\n}\n")
     if wrong:
         for each in judged:
             if not each.right:

@@ -160,9 +160,9 @@ def check_side(thought: Thought) -> Iterator[Refusal]:
     for clause in (*thought.clauses, *resolved(thought)):
         if not clause.mentions or clause.guessed or clause.negated or clause.past:
             continue
-        if _TURNS_ROUND.search(thought.sentences[clause.sentence]):
-            continue
         told = [*_sides(clause, thought.phrases)]
+        if not told or _TURNS_ROUND.search(thought.sentences[clause.sentence]):
+            continue
         for direction, nearly, groups in told:
             if len(told) > len(clause.mentions):
                 break  # "ahead, on the left": something between them
@@ -382,7 +382,7 @@ def _sides(clause: Clause, phrases: Phrases) -> Iterator[tuple[str, bool, list[M
         leading = not clause.among(0, found[0][0]) or (
             phrases.is_so.match(clause.text, end) and clause.among(end, stop)
         )
-        if _SHUTS.search(clause.text, 0, start):
+        if direction == "behind" and _SHUTS.search(clause.text, 0, start):
             continue  # "I closed it behind me"
         if leading or clause.text.startswith("的", end):
             if _NAMELESS.fullmatch(clause.text[begin:start]) and clause.text[end : end + 1] == ",":

@@ -357,7 +357,10 @@ def _is_alive(process: int) -> bool:
 
 @contextlib.contextmanager
 def _environment(changes: Mapping[str, str]) -> Iterator[None]:
-    """Environment variables for the length of a ``with`` statement; those that are set stay."""
+    """Environment variables for the length of a ``with`` statement; those that are set stay.
+
+    What Ray sets meanwhile is taken away with them.
+    """
     mine = {name for name in (*changes, *_LEFT_BY_RAY) if name not in os.environ}
     os.environ.update({name: value for name, value in changes.items() if name in mine})
     try:
