@@ -225,8 +225,15 @@ def test_filter_slider_keys_and_comparison(page, serve, runs, tmp_path):
     assert page.locator("#differences tbody tr").count() == 1
     page.click("#flipped tbody a >> nth=0")
     page.wait_for_selector(".sides svg.room >> nth=1")
+    page.wait_for_selector("li.now >> nth=1")
     page.keyboard.press("ArrowRight")
     assert page.locator("li.now").count() == 2
+
+
+def begin_to_play(page: Any, shown: str) -> None:
+    page.click("button.main")
+    page.wait_for_selector(shown, state="attached")
+    page.wait_for_load_state("domcontentloaded")  # keys are heard once the scripts have run
 
 
 def test_a_person_plays_a_whole_task_to_success(page, serve, runs, tmp_path):
@@ -240,7 +247,7 @@ def test_a_person_plays_a_whole_task_to_success(page, serve, runs, tmp_path):
     )
     assert page.input_value("select[name=task]") == ""  # until one is chosen, the next one
     page.select_option("select[name=task]", record.task_id)
-    page.click("button.main")
+    begin_to_play(page, "input[name=step]")
     for number, step in enumerate(record.steps[1:], 1):
         action = f"{step.verb} {step.object_type}".strip()
         page.wait_for_selector(f"input[name=step][value='{number}']", state="attached")
@@ -281,12 +288,6 @@ def test_a_type_counts_that_was_chosen_before_the_script_had_come(page, serve, t
     route.continue_()
     page.wait_for_function("() => document.forms.choose.elements.task.length < 50")
     assert page.input_value("select[name=type]") == "single_search"
-
-
-def begin_to_play(page: Any, shown: str) -> None:
-    page.click("button.main")
-    page.wait_for_selector(shown)
-    page.wait_for_load_state("domcontentloaded")  # keys are heard once the scripts have run
 
 
 def test_news_that_are_none_do_not_take_the_focus_between_two_keys(page, serve, tmp_path):
