@@ -1,5 +1,5 @@
-/* Attention of one new token of each of many conversations to all tokens of its own, on several
- * threads: what scaled_dot_product_attention computes, but for rounding, and with the keys and
+/* Attention of a few new tokens of each of many conversations to all tokens of its own up to
+ * themselves, on several threads: what scaled_dot_product_attention computes, but for rounding, and with the keys and
  * values where each conversation keeps them. compiled_attention.py compiles and calls it.
  *
  * The time is that of reading keys and values once. Torch's own takes a call and a dozen views for
@@ -21,8 +21,9 @@ typedef struct {
     const float *query, *key, *value; /* of all new tokens of the batch */
     intptr_t query_head, query_token, key_head, key_token, value_head, value_token; /* strides */
     float *found;                  /* (new tokens of the batch, heads, size) */
-    const intptr_t *place;         /* (rows,) of its token among the new ones */
-    const intptr_t *before;        /* (rows,) its tokens before the new one */
+    const intptr_t *place;         /* (rows,) of its first token among the new ones */
+    const intptr_t *count;         /* (rows,) its new tokens, side by side */
+    const intptr_t *before;        /* (rows,) its tokens before the new ones */
     const intptr_t *room;          /* (rows,) tokens for which its memory has room */
     float *const *keys;            /* (rows,) its memory, (groups, room, size) */
     float *const *values;          /* (rows,) the same */
@@ -160,21 +161,25 @@ static void rows_of(const Part *part)
     const Layer *in = part->layer;
     intptr_t shared = in->heads / in->groups;
     for (intptr_t row = part->first; row < part->last; row++) {
-        intptr_t before = in->before[row], token = in->place[row];
+        intptr_t before = in->before[row], place = in->place[row], count = in->count[row];
         for (intptr_t group = 0; group < in->groups; group++) {
             float *keys = in->keys[row] + group * in->room[row] * in->size;
             float *values = in->values[row] + group * in->room[row] * in->size;
-            memcpy(keys + before * in->size,
-                   in->key + group * in->key_head + token * in->key_token,
-                   in->size * sizeof(float));
-            memcpy(values + before * in->size,
-                   in->value + group * in->value_head + token * in->value_token,
-                   in->size * sizeof(float));
+            for (intptr_t new = 0; new < count; new++) {
+                memcpy(keys + (before + new) * in->size,
+                       in->key + group * in->key_head + (place + new) * in->key_token,
+                       in->size * sizeof(float));
+                memcpy(values + (before + new) * in->size,
+                       in->value + group * in->value_head + (place + new) * in->value_token,
+                       in->size * sizeof(float));
+            }
             for (intptr_t head = group * shared; head < (group + 1) * shared; head++)
-                head_of_size(in->query + head * in->query_head + token * in->query_token, keys,
-                             values, part->scores,
-                             in->found + (token * in->heads + head) * in->size, before + 1,
-                             in->size, in->scale);
+                for (intptr_t new = 0; new < count; new++)
+                    head_of_size(in->query + head * in->query_head
+                                     + (place + new) * in->query_token,
+                                 keys, values, part->scores,
+                                 in->found + ((place + new) * in->heads + head) * in->size,
+                                 before + new + 1, in->size, in->scale);
         }
     }
 }
@@ -191,8 +196,9 @@ int er_gym_attend(const Layer *layer)
     intptr_t threads = layer->threads < layer->rows ? layer->threads : layer->rows;
     intptr_t all = 0, longest = 0;
     for (intptr_t row = 0; row < layer->rows; row++) {
-        all += layer->before[row] + 1;
-        if (layer->before[row] + 1 > longest) longest = layer->before[row] + 1;
+        intptr_t tokens = layer->before[row] + layer->count[row];
+        all += tokens * layer->count[row];
+        if (tokens > longest) longest = tokens;
     }
     if (threads < 1) return 0;
     Part *parts = malloc(threads * sizeof(Part));
@@ -208,7 +214,7 @@ int er_gym_attend(const Layer *layer)
         *part = (Part){layer, row, row, scores + number * longest};
         for (; row < layer->rows && (number == threads - 1 || done * threads < (number + 1) * all);
              row++)
-            done += layer->before[row] + 1;
+            done += (layer->before[row] + layer->count[row]) * layer->count[row];
         part->last = row;
         /* What has no thread of its own is done here. */
         if (number == threads - 1 || pthread_create(others + number, NULL, run, part))

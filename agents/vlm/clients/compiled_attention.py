@@ -1,4 +1,4 @@
-"""Attention of conversations that are one token longer by a compiled kernel, where there is one.
+"""Attention of conversations that are a few tokens longer by a compiled kernel, where there is one.
 
 The kernel is attention.c: one call for a layer of all conversations, which reads their keys and
 values where they are kept. Torch takes calls and views for each of them, and half as long again.
@@ -33,7 +33,7 @@ class _Layer(ctypes.Structure):
             for part in ("query", "key", "value")
             for stride in ("head", "token")
         ),
-        *((name, ctypes.c_void_p) for name in ("found", "place", "before", "room")),
+        *((name, ctypes.c_void_p) for name in ("found", "place", "count", "before", "room")),
         *((name, ctypes.c_void_p) for name in ("keys", "values")),
         ("scale", ctypes.c_float),
         ("threads", ctypes.c_ssize_t),
@@ -65,23 +65,26 @@ def addresses(layers: Layers) -> NDArray[np.intp]:
 
 
 class NextTokens:
-    """The conversations of a batch that are one token longer.
+    """The conversations of a batch that are a few tokens longer.
 
     Args:
-        places: of their tokens among the new ones of the batch.
+        places: of the first token of each among the new ones of the batch.
+        counts: how many new ones each has, side by side; the time is that of as many conversations.
         before: how many tokens each had before.
-        rooms: for how many tokens the memory of each has room, one more than ``before`` at least.
+        rooms: for how many tokens the memory of each has room: those before and the new ones at
+            least.
         memories: the :func:`addresses` of each.
     """
 
     def __init__(
         self,
         places: Sequence[int],
+        counts: Sequence[int],
         before: Sequence[int],
         rooms: Sequence[int],
         memories: Sequence[NDArray[np.intp]],
     ) -> None:
-        self._numbers = np.array([places, before, rooms], np.intp)
+        self._numbers = np.array([places, counts, before, rooms], np.intp)
         self._memories = np.stack(memories, axis=-1)  # (layers, 2, conversations)
 
     def attend(

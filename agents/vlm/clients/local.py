@@ -333,6 +333,8 @@ class LocalClient:
             return None
         if self._kept is not None:
             self._kept.keep(row.prompt.name, row.turns())
+        assert self._packed is not None
+        self._packed.ended(row)
         reply = self._reply(row.prompt, row.said)
         return Spoken(reply, row.prompt.ids, row.said, row.scores)
 

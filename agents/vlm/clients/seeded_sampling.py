@@ -28,7 +28,10 @@ class SeededSampling:
         """Scores with noise; both (rows, words)."""
         if not self._sources:  # the device is known only now
             self._sources = [torch.Generator(scores.device).manual_seed(s) for s in self._seeds]
-        return with_noise(self._sampled(scores), self._sources)
+        noise = torch.empty_like(scores)
+        for row, source in zip(noise, self._sources, strict=True):
+            row.exponential_(generator=source)
+        return with_noise(self._sampled(scores), noise)
 
 
 class SampledScores:
@@ -51,9 +54,6 @@ def never_drawn(scores: torch.Tensor, token: int) -> None:
     scores[:, token] = _NEVER
 
 
-def with_noise(scores: torch.Tensor, sources: Sequence[torch.Generator]) -> torch.Tensor:
-    """Scores, (rows, words), with Gumbel noise from each row's own generator."""
-    noise = torch.empty_like(scores)
-    for row, source in zip(noise, sources, strict=True):
-        row.exponential_(generator=source)
+def with_noise(scores: torch.Tensor, noise: torch.Tensor) -> torch.Tensor:
+    """Scores with Gumbel noise, made of exponentially distributed numbers; all (rows, words)."""
     return scores - noise.log()

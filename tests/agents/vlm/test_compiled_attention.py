@@ -18,7 +18,9 @@ from agents.vlm.settings import Sampling
 pytestmark = pytest.mark.skipif(not has_kernel(), reason="this machine has no C compiler")
 
 BEFORE = [0, 1, 14, 15, 16, 17, 40, 99]
-"""Tokens of the conversations before the new one: around the 16 that are done at once."""
+"""Tokens of the conversations before the new ones: around the 16 that are done at once."""
+NEW = [1, 2, 3, 1, 9, 1, 20, 2]
+"""New tokens of each."""
 
 
 def kept(generator: torch.Generator, groups: int, before: int, room: int, size: int):
@@ -35,34 +37,37 @@ def test_each_conversation_attends_to_its_own_tokens(
 ) -> None:
     monkeypatch.setattr(torch, "get_num_threads", lambda: threads)
     generator = torch.Generator().manual_seed(size + heads)
-    rooms = [1 + number % 3 for number in range(len(BEFORE))]
+    rooms = [count + number % 3 for number, count in enumerate(NEW)]
     memories = [
         kept(generator, groups, before, room, size)
         for before, room in zip(BEFORE, rooms, strict=True)
     ]
-    places = [2 * number + 1 for number in range(len(BEFORE))]  # others' tokens lie between
-    tokens = 2 * len(BEFORE) + 1
+    places = [number + 1 + sum(NEW[:number]) for number in range(len(NEW))]  # others lie between
+    tokens = len(NEW) + 1 + sum(NEW)
     query = torch.randn(1, heads, tokens, size, generator=generator)
     key, value = (
         torch.randn(1, tokens, groups, size, generator=generator).transpose(1, 2) for _ in range(2)
     )
     found = torch.full((1, tokens, heads, size), torch.nan)
     whole = [before + room for before, room in zip(BEFORE, rooms, strict=True)]
-    ones = NextTokens(places, BEFORE, whole, [addresses(each) for each in memories])
+    ones = NextTokens(places, NEW, BEFORE, whole, [addresses(each) for each in memories])
     before = [[part.clone() for part in memory[0]] for memory in memories]
     ones.attend(1, query, key, value, found, size**-0.5)
-    for number, (place, old) in enumerate(zip(places, BEFORE, strict=True)):
+    written = torch.zeros(tokens, dtype=torch.bool)
+    for number, (place, count, old) in enumerate(zip(places, NEW, BEFORE, strict=True)):
         keys, values = memories[number][1]
-        assert torch.equal(keys[:, old], key[0, :, place])
-        assert torch.equal(values[:, old], value[0, :, place])
+        new = slice(place, place + count)
+        written[new] = True
+        assert torch.equal(keys[:, old : old + count], key[0, :, new])
+        assert torch.equal(values[:, old : old + count], value[0, :, new])
         wanted = functional.scaled_dot_product_attention(
-            query[:, :, [place]], keys[None, :, : old + 1], values[None, :, : old + 1],
-            enable_gqa=True,
+            query[:, :, new], keys[None, :, : old + count], values[None, :, : old + count],
+            attn_mask=torch.ones(count, old + count, dtype=torch.bool).tril(old), enable_gqa=True,
         )  # fmt: skip
-        torch.testing.assert_close(found[:, place], wanted[:, :, 0], rtol=1e-5, atol=1e-6)
+        torch.testing.assert_close(found[:, new], wanted.transpose(1, 2), rtol=1e-5, atol=1e-6)
         for part, same in zip(memories[number][0], before[number], strict=True):
             assert torch.equal(part, same)  # the other layer
-    assert torch.isnan(found[0, 0::2]).all()  # nothing else is written
+    assert torch.isnan(found[0, ~written]).all()  # nothing else is written
 
 
 def test_scores_of_any_size_give_no_overflow() -> None:
@@ -71,7 +76,7 @@ def test_scores_of_any_size_give_no_overflow() -> None:
     query = torch.randn(1, 1, 1, 32, generator=generator) * 1e4
     key, value = torch.randn(2, 1, 1, 1, 32, generator=generator)
     found = torch.empty(1, 1, 1, 32)
-    NextTokens([0], [40], [41], [addresses(memory)]).attend(0, query, key, value, found, 1.0)
+    NextTokens([0], [1], [40], [41], [addresses(memory)]).attend(0, query, key, value, found, 1.0)
     keys, values = memory[0]
     wanted = functional.scaled_dot_product_attention(query, keys[None], values[None], scale=1.0)
     torch.testing.assert_close(found[:, 0], wanted[:, :, 0])
@@ -88,7 +93,7 @@ def test_the_kernel_follows_a_memory_that_has_moved_since_it_was_full() -> None:
     rooms = []
     for done in range(10, 18):
         row.done = done
-        room, places = row.memory()
+        room, places = row.memory(1)
         assert room > done
         assert (places == addresses(row.turns().layers)).all()
         rooms.append(room)
