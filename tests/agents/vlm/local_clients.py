@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shutil
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -111,6 +112,19 @@ def watched(client: LocalClient, before: Callable[[int], object]) -> None:
         return generate(**inputs)
 
     client._model.generate = generated
+
+
+def gathered(client: LocalClient, count: int) -> None:
+    """Hold the model's first step until so many conversations are here, those in it included."""
+    held: list[int] = []
+
+    def hold(now: int) -> None:
+        until = time.monotonic() + LONG
+        while not held and now + client._jobs.waiting.qsize() < count and time.monotonic() < until:
+            time.sleep(0.001)
+        held.append(now)
+
+    watched(client, hold)
 
 
 BOTH_WAYS = pytest.mark.parametrize("reuse", [True, False], ids=["packed", "padded"])
