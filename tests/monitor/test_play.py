@@ -57,6 +57,13 @@ def player(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Player]:
         yield player
 
 
+@pytest.fixture
+def alone(tmp_path: Path) -> Iterator[Player]:
+    """A monitor in which no other test has played."""
+    with Player(tmp_path) as player:
+        yield player
+
+
 class Player:
     """A browser of a monitor, without JavaScript."""
 
@@ -196,26 +203,27 @@ def test_playing_leaves_the_run_that_bench_writes(
 
 
 def test_the_episode_in_play_begins_again_with_the_pictures_of_a_vision_language_agent(
-    player: Player,
+    alone: Player,
 ) -> None:
-    left = player.begin("", type=TYPE)  # the next that has not been played
-    assert SECOND.instruction in player.get(left)
-    assert player.act(left, "observe").status_code == 303
-    assert player.post(left, do="close").status_code == 303
-    assert WORDS["play_was_left"] in player.get(left)
-    assert [each.task_id for each in player.run().episodes()] == [FIRST.id]
+    assert alone.act(alone.begin(), "end").status_code == 303
+    left = alone.begin("", type=TYPE)  # the next that has not been played
+    assert SECOND.instruction in alone.get(left)
+    assert alone.act(left, "observe").status_code == 303
+    assert alone.post(left, do="close").status_code == 303
+    assert WORDS["play_was_left"] in alone.get(left)
+    assert [each.task_id for each in alone.run().episodes()] == [FIRST.id]
 
-    session = player.begin("", type=TYPE)
-    assert SECOND.instruction in player.get(session)
-    assert player.act(session, "observe").status_code == 303
+    session = alone.begin("", type=TYPE)
+    assert SECOND.instruction in alone.get(session)
+    assert alone.act(session, "observe").status_code == 303
     shown = [
-        player.client.get(address.replace("&amp;", "&")).content
-        for address in re.findall(r'<img src="([^"]+)"', player.get(session))
+        alone.client.get(address.replace("&amp;", "&")).content
+        for address in re.findall(r'<img src="([^"]+)"', alone.get(session))
     ]
     assert len(shown) == len({*shown}) == 4
-    assert player.act(session, "end").status_code == 303
-    assert WORDS["play_failure"] in player.get(session)
-    run = player.run()
+    assert alone.act(session, "end").status_code == 303
+    assert WORDS["play_failure"] in alone.get(session)
+    run = alone.run()
     kept = conversation(run, SECOND.id)
     of_turn = [
         [(run.path / part.path).read_bytes() for part in message.parts if not isinstance(part, str)]
@@ -225,17 +233,17 @@ def test_the_episode_in_play_begins_again_with_the_pictures_of_a_vision_language
     assert [len(each) for each in of_turn] == [1, 4]
     assert of_turn[1] == shown
     assert [each.by for each in kept.rounds] == ["person", "person"]
-    replay = re.search(r'href="(/runs/\w+/episode[^"]+)"', player.get(session))
+    replay = re.search(r'href="(/runs/\w+/episode[^"]+)"', alone.get(session))
     assert replay is not None
-    page = player.get(replay[1].replace("&amp;", "&"))
+    page = alone.get(replay[1].replace("&amp;", "&"))
     assert page.count("data-picture=") == 5
     assert WORDS["said"] not in page  # there is no model
 
-    assert player.post(session, do="next").status_code == 303
-    after = player.get(session)
+    assert alone.post(session, do="next").status_code == 303
+    after = alone.get(session)
     assert SECOND.instruction not in after
-    assert player.step(session) == "1"
-    assert player.post(session, do="close").status_code == 303
+    assert alone.step(session) == "1"
+    assert alone.post(session, do="close").status_code == 303
 
 
 def test_a_step_decided_in_place_of_a_model_is_its_own_turn(
@@ -400,9 +408,12 @@ def test_an_action_is_typed_and_a_task_is_skipped(tmp_path: Path) -> None:
 
 def test_sessions_are_few_and_end_when_the_person_has_left(tmp_path: Path) -> None:
     sessions = Sessions(most=1, idle_seconds=0.5)
-    first = sessions.begin(plan(tmp_path, suite="mini", task=FIRST.id))
+    one, other = (
+        plan(tmp_path, suite="mini", task=FIRST.id, agent=each) for each in ("", "random")
+    )
+    first = sessions.begin(one)
     with pytest.raises(Refused, match="play_too_many") as refused:
-        sessions.begin(plan(tmp_path, suite="mini", task=FIRST.id, agent="random"))
+        sessions.begin(other)
     assert refused.value.status == 429
     while first.now.phase != "closed":
         first.wait(60.0, first.now.version)
