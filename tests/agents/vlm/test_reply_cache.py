@@ -205,6 +205,7 @@ def test_a_damaged_file_is_set_aside(
     damage(directory / diskcache.core.DBNAME)
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
+        warnings.simplefilter("ignore", ResourceWarning)  # of what other tests have left open
         kept = make(client)
         for seed in range(300):
             assert kept.reply(HELLO, seed).text.startswith("reply ")
