@@ -153,9 +153,8 @@ def test_news_leave_scrolling_rows_and_selected_text_as_they_are(page, serve, ru
     assert page.evaluate(left) == [150, 2]
 
     page.evaluate("getSelection().selectAllChildren(row.querySelector('a'))")
-    shutil.rmtree(tmp_path / "a")
     with page.expect_event("requestfinished", lambda one: one.url == page.url):
-        pass
+        shutil.rmtree(tmp_path / "a")
     page.wait_for_timeout(100)
     assert page.evaluate("getSelection().toString()").endswith("/m")
     assert page.evaluate(left) == [150, 2], "it waits"
