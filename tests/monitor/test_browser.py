@@ -42,12 +42,17 @@ def browser() -> Iterator[Any]:
         browser.close()
 
 
+def patient(context: Any) -> Any:
+    """A browser's context that waits for two minutes: the machine may be busy."""
+    context.set_default_timeout(120_000)
+    return context
+
+
 @pytest.fixture
 def page(browser) -> Iterator[Any]:
     """A page; nothing may be asked of another host, and nothing may go wrong in the console."""
-    context = browser.new_context()
+    context = patient(browser.new_context())
     page = context.new_page()
-    page.set_default_timeout(120_000)
     wrong: list[str] = []
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("console", lambda one: one.type == "error" and wrong.append(one.text))
@@ -88,7 +93,6 @@ def wait_until(page: Any, enough: int) -> None:
         "enough => Number((/(\\d+) of 132/.exec(document.querySelector('#summary')?.innerText)"
         " || [0, -1])[1]) >= enough",
         arg=enough,
-        timeout=120_000,
     )
 
 
@@ -132,7 +136,6 @@ def test_a_run_fills_by_itself_though_run_and_server_are_killed(page, serve, tmp
 def test_twenty_open_pages_are_served_and_all_are_renewed(page, serve, runs, tmp_path):
     """A browser has six connections to a server: no page may keep one."""
     address = serve(tmp_path).address
-    page.context.set_default_timeout(120_000)
     pages = [page, *(page.context.new_page() for _ in range(19))]
     for each in pages:
         each.goto(address)
@@ -168,7 +171,7 @@ def test_news_leave_scrolling_rows_and_selected_text_as_they_are(page, serve, ru
 def test_a_link_of_another_site_with_the_token_opens_the_page(browser, serve, tmp_path):
     """And a later one without it; but a form of that site is not let in."""
     address = serve(tmp_path, token="secret").address
-    context = browser.new_context()
+    context = patient(browser.new_context())
     page = context.new_page()
     body = ""
     context.route(
@@ -356,8 +359,10 @@ def test_keys_are_kept_while_an_action_is_on_its_way_and_pictures_lie_as_seen(
 
 
 def test_it_fits_a_telephone_in_the_dark_and_in_chinese(browser, serve, runs):
-    context = browser.new_context(
-        viewport={"width": 360, "height": 740}, color_scheme="dark", locale="zh-CN"
+    context = patient(
+        browser.new_context(
+            viewport={"width": 360, "height": 740}, color_scheme="dark", locale="zh-CN"
+        )
     )
     page = context.new_page()
     address = serve(runs).address
@@ -404,7 +409,7 @@ def test_pages_of_all_kinds_can_be_used_without_eyes_or_mouse(browser, serve, ru
         f"/training/curves?of={ids['finetuning']}&of={ids['policy']}",
     ]  # fmt: skip
     wrong = []
-    context = browser.new_context(bypass_csp=True, reduced_motion="reduce")
+    context = patient(browser.new_context(bypass_csp=True, reduced_motion="reduce"))
     page = context.new_page()
     for place in pages:
         page.goto(address + place)
