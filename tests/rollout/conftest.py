@@ -8,7 +8,8 @@ import pytest
 from forked import SPAWNED
 
 
-@pytest.fixture(scope="package", autouse=True)
+# For pytest a folder without an __init__.py is no package: "package" would be the whole session.
+@pytest.fixture(scope="module", autouse=True)
 def spawned() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("er_gym.rollout.processes.CONTEXT", SPAWNED)
