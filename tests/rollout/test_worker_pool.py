@@ -20,6 +20,8 @@ from er_gym.rollout.worker_pool import LostJob, WorkerSetupError, _serve, run_jo
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
+LONG = 120.0
+"""Seconds after which what a test waits for will not come."""
 
 
 @pytest.fixture
@@ -175,7 +177,7 @@ def test_workers_do_not_outlive_their_parent(tmp_path, signum):
             os.killpg(parent.pid, signum)  # as a terminal does: to the workers, too
         else:
             parent.send_signal(signum)
-        _, stderr = parent.communicate(timeout=20)
+        _, stderr = parent.communicate(timeout=LONG)
         wait_for(lambda: not any(alive(pid) for pid in pids))
         assert len(list(tmp_path.glob("closed-*"))) == 2
         assert stderr.count("Traceback") == (signum == signal.SIGINT)  # the parent's own
@@ -191,8 +193,8 @@ def alive(pid: int) -> bool:
     return state != "Z"
 
 
-def wait_for(condition, seconds: float = 20.0) -> None:
-    deadline = time.monotonic() + seconds
+def wait_for(condition) -> None:
+    deadline = time.monotonic() + LONG
     while not condition():
         assert time.monotonic() < deadline, "waited in vain"
         time.sleep(0.02)
