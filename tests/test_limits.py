@@ -22,10 +22,10 @@ def test_after():
 """
 
 
-def pytest_of(program: str, folder: Path) -> str:
+def pytest_of(program: str, folder: Path, last: int) -> str:
     """What pytest prints of a program, with this project's settings and shorter limits."""
     (folder / "test_it.py").write_text(program, encoding="utf-8")
-    limits = ("-o", "timeout=1", "-o", "faulthandler_timeout=3")
+    limits = ("-o", "timeout=1", "-o", f"faulthandler_timeout={last}")
     command = [sys.executable, "-m", "pytest", "-n0", "-p", "no:cacheprovider", *limits]
     settings = ("-c", str(ROOT / "pyproject.toml"), "--rootdir", str(folder))
     done = subprocess.run(
@@ -36,14 +36,14 @@ def pytest_of(program: str, folder: Path) -> str:
 
 
 def test_a_test_that_hangs_fails_and_the_others_go_on(tmp_path: Path) -> None:
-    told = pytest_of(f"TIDIES_UP_FOR_EVER = False\n{HANGS}", tmp_path)
+    told = pytest_of(f"TIDIES_UP_FOR_EVER = False\n{HANGS}", tmp_path, last=60)
     assert "Timeout (>1.0s)" in told
     assert "threading.Event().wait()" in told
     assert "1 failed, 1 passed" in told
 
 
 def test_a_test_that_hangs_even_then_ends_its_process(tmp_path: Path) -> None:
-    told = pytest_of(f"TIDIES_UP_FOR_EVER = True\n{HANGS}", tmp_path)
+    told = pytest_of(f"TIDIES_UP_FOR_EVER = True\n{HANGS}", tmp_path, last=3)
     assert "most recent call first" in told
     assert "in test_that_waits" in told
 
