@@ -157,6 +157,8 @@ def test_who_has_hung_up_gets_no_reply():
         with socket.create_connection((host, int(port))) as client:
             body = b'{"messages": []}'
             client.sendall(b"POST / HTTP/1.1\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body))
+        while not server.count:
+            time.sleep(0.01)
         time.sleep(1.0)
         assert (server.count, server.accepted, server.repeated) == (1, 0, 0)
         assert not server.answered
