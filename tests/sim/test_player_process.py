@@ -31,6 +31,8 @@ THIRD_PARTY = (
     "third_party_semantic_segmentation_frames",
 )
 SMALL = {"width": 64, "height": 48}
+LONG = 60.0
+"""Seconds after which what a test waits for will not come."""
 CORNER = {"position": {"x": 1.5, "y": 2.2, "z": -1.5}, "rotation": {"x": 30, "y": -45, "z": 5}}
 
 
@@ -73,11 +75,15 @@ def is_alive(pid: int) -> bool:
     return state != "Z"
 
 
-def ends(pid: int, within: float = 5.0) -> bool:
-    deadline = time.monotonic() + within
-    while is_alive(pid) and time.monotonic() < deadline:
+def ends(pid: int) -> bool:
+    return comes(lambda: not is_alive(pid))
+
+
+def comes(condition) -> bool:
+    deadline = time.monotonic() + LONG
+    while not condition() and time.monotonic() < deadline:
         time.sleep(0.02)
-    return not is_alive(pid)
+    return condition()
 
 
 # -- the same events -------------------------------------------------------------------------------
@@ -373,7 +379,7 @@ def test_stop_leaves_no_process_and_no_file(tmp_path, monkeypatch):
 def test_sigterm_ends_it_well():
     controller = launch()
     controller.server.unity_proc.terminate()
-    assert controller.server.unity_proc.wait(5) == 0
+    assert controller.server.unity_proc.wait(LONG) == 0
     controller.stop()
 
 
@@ -389,7 +395,7 @@ def test_end_of_file_on_either_pipe_ends_it_well(pipe):
     getattr(controller.server, pipe).close()
     if pipe == "server_pipe":  # the player hears of it when it answers
         controller.server.send({"action": "Pass"})
-    assert controller.server.unity_proc.wait(5) == 0
+    assert controller.server.unity_proc.wait(LONG) == 0
     controller.stop()
 
 
@@ -400,7 +406,7 @@ def test_over_wsgi_it_ends_when_the_client_says_so_or_refuses_it():
         if end == "refuse":
             controller.server.client_token = "another's"
         controller.server.send({"action": "Pass"} if end == "refuse" else {})
-        assert controller.server.unity_proc.wait(5) == 0
+        assert controller.server.unity_proc.wait(LONG) == 0
         controller.stop()
 
 
@@ -426,7 +432,7 @@ def test_what_the_environment_lacks_is_said(variables, code, words):
         capture_output=True,
         text=True,
         env={**os.environ, **variables},
-        timeout=30,
+        timeout=LONG,
     )
     assert done.returncode == code
     assert words in done.stderr
@@ -454,7 +460,8 @@ def test_its_parents_death_ends_it(when):
     parent = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert parent.stdout is not None
     pid = int(parent.stdout.readline())
-    time.sleep(0.05)  # the shell has seen whose child it is; Python is not there yet
+    # The shell has seen whose child it is; Python has just begun.
+    assert comes(lambda: b"-parent" in Path(f"/proc/{pid}/cmdline").read_bytes())
     assert is_alive(pid)
     parent.kill()
     parent.wait()
