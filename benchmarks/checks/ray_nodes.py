@@ -50,11 +50,15 @@ class RayNodes:
             kill(self.cluster.head_node.all_processes[name][0].process.pid)
 
     def workers(self) -> list[int]:
-        """The processes that work for er-gym now."""
+        """The processes that work for er-gym on these nodes now; other clusters may be here."""
+        nodes = self.cluster.list_all_nodes()
+        raylets = {node.all_processes["raylet"][0].process.pid for node in nodes}
         return [
             int(folder.name)
             for folder in Path("/proc").iterdir()
-            if folder.name.isdigit() and _title(folder).startswith(("ray::JobActor", "ray::EnvA"))
+            if folder.name.isdigit()
+            and _title(folder).startswith(("ray::JobActor", "ray::EnvA"))
+            and _parent(folder) in raylets
         ]
 
 
@@ -95,3 +99,10 @@ def _title(folder: Path) -> str:
         return (folder / "cmdline").read_bytes().decode(errors="replace")
     except OSError:
         return ""
+
+
+def _parent(folder: Path) -> int:
+    try:
+        return int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+    except OSError:
+        return 0
