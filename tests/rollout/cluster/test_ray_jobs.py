@@ -53,13 +53,12 @@ def pids(results):
 
 def is_alive(pid):
     try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
+        return "ray::" in Path(f"/proc/{pid}/cmdline").read_text()
+    except (FileNotFoundError, ProcessLookupError):
         return False
-    return "ray::" in Path(f"/proc/{pid}/cmdline").read_text()
 
 
-def until(check, seconds=20):
+def until(check, seconds=100):
     end = time.monotonic() + seconds
     while not check() and time.monotonic() < end:
         time.sleep(0.1)
@@ -182,9 +181,15 @@ from ray._private import services
 from er_gym.rollout.cluster.session import RayUnavailable, ray_backend
 from er_gym.rollout.cluster.settings import RaySettings
 
+def stats():
+    for each in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            yield each.read_text().rpartition(")")
+        except OSError:
+            pass  # it has just ended
+
 def servers():
-    stats = [each.read_text().rpartition(")") for each in Path("/proc").glob("[0-9]*/stat")]
-    mine = [stat for stat in stats if int(stat[2].split()[1]) == os.getpid()]
+    mine = [stat for stat in stats() if int(stat[2].split()[1]) == os.getpid()]
     return sum("gcs_server" in stat[0] for stat in mine)
 
 def no_raylet(*args, **kwargs):
