@@ -1,6 +1,7 @@
 /* Attention of a few new tokens of each of many conversations to all tokens of its own up to
- * themselves, on several threads: what scaled_dot_product_attention computes, but for rounding, and with the keys and
- * values where each conversation keeps them. compiled_attention.py compiles and calls it.
+ * themselves, on several threads: what scaled_dot_product_attention computes, but for rounding,
+ * and with the keys and values where each conversation keeps them. compiled_attention.py compiles
+ * and calls it.
  *
  * The time is that of reading keys and values once. Torch's own takes a call and a dozen views for
  * each conversation, and twice the time within. Written in GCC's vectors: where another compiler

@@ -98,8 +98,8 @@ class PackedRow:
             chances: the logarithms of their probabilities; empty if they are not kept.
         """
         pairs = zip(self.draft, drawn, strict=False)
-        right = next((n for n, (guess, token) in enumerate(pairs) if guess != token), None)
-        right = len(self.draft) if right is None else right
+        wrong = (place for place, (guess, token) in enumerate(pairs) if guess != token)
+        right = next(wrong, len(self.draft))
         self.done += len(self.new) - len(self.draft) + right
         self.draft = ()
         self.said += drawn[: right + 1]

@@ -93,8 +93,9 @@ def test_the_kernel_follows_a_memory_that_has_moved_since_it_was_full() -> None:
     rooms = []
     for done in range(10, 18):
         row.done = done
-        room, places = row.memory(1)
-        assert room > done
+        count = 1 + done % 2
+        room, places = row.memory(count)
+        assert room >= done + count
         assert (places == addresses(row.turns().layers)).all()
         rooms.append(room)
     assert rooms[0] == 12 < rooms[-1]  # it was full in between
