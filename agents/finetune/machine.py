@@ -34,6 +34,21 @@ def is_first() -> bool:
     return os.environ.get("RANK", "0") == "0"
 
 
+def share_gpus() -> bool:
+    """Let the processes of this machine share its GPUs if there are more processes; says whether
+    they do.
+
+    Several processes are worth while where a model is so small that to play takes longer in Python
+    than on the GPU. accelerate takes the number of a process for that of its GPU, which then is
+    not there.
+    """
+    gpus = torch.cuda.device_count()
+    if not 0 < gpus < int(os.environ.get("LOCAL_WORLD_SIZE", "1")):
+        return False
+    os.environ["LOCAL_RANK"] = str(int(os.environ["LOCAL_RANK"]) % gpus)
+    return True
+
+
 def free_memory() -> int:
     """Bytes that training may take: the GPU's, or those of the machine or of its container."""
     if on_gpu():

@@ -25,7 +25,11 @@ from typing import Any
 
 import accelerate
 import torch
-from accelerate.utils import DistributedDataParallelKwargs, gather_object
+from accelerate.utils import (
+    DistributedDataParallelKwargs,
+    InitProcessGroupKwargs,
+    gather_object,
+)
 from torch.utils.tensorboard import SummaryWriter
 from transformers.trainer_utils import set_seed
 
@@ -215,13 +219,14 @@ def _reinforce(
     # Another run in this process may have left its own, as transformers' trainer knows, too.
     accelerate.state.AcceleratorState._reset_state()
     sees = agent.sees == "pictures"
+    # A batch without pictures leaves eyes that learn without gradients.
+    handlers: list[Any] = [
+        DistributedDataParallelKwargs(find_unused_parameters=eyes_learn(files, settings))
+    ]
+    if machine.share_gpus():
+        handlers.append(InitProcessGroupKwargs(backend="gloo"))  # NCCL wants a GPU for each
     accelerator = accelerate.Accelerator(
-        cpu=not machine.on_gpu(),
-        mixed_precision="no",
-        # A batch without pictures leaves eyes that learn without gradients.
-        kwargs_handlers=[
-            DistributedDataParallelKwargs(find_unused_parameters=eyes_learn(files, settings))
-        ],
+        cpu=not machine.on_gpu(), mixed_precision="no", kwargs_handlers=handlers
     )
     lora = settings.model.lora is not None
     network = load_network(files, settings.model, dtype if lora else "float32")

@@ -76,6 +76,8 @@ class NextTokens:
         memories: the :func:`addresses` of each.
     """
 
+    longest = 0  # of a turn; torch is faster with those
+
     def __init__(
         self,
         places: Sequence[int],

@@ -312,10 +312,11 @@ class LocalClient:
         text = f"{self._settings.seed} {episode} {messages}"
         return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
 
-    # -- tokens to replies, in the thread of the jobs: on a CPU, step by step --------------------
+    # -- tokens to replies, in the thread of the jobs: step by step ------------------------------
 
     def _begun(self, prompt: EncodedPrompt) -> PackedRow:
-        return PackedRow(prompt, self._settings.sampling, scored=self._scored)
+        assert self._packed is not None
+        return self._packed.begin(prompt, scored=self._scored)
 
     def _next_tokens(self, rows: Sequence[PackedRow]) -> None:
         assert self._packed is not None

@@ -1,11 +1,12 @@
-"""Generates replies to many conversations on a CPU, token by token, without padding.
+"""Generates replies to many conversations token by token, without padding.
 
 ``generate`` of transformers pads all conversations of a batch to the longest, and works until the
-longest reply ends. On a CPU, where memory moves slowly, most of the time goes there. Here one step
-processes what is new of each conversation (a turn, or the last token of its reply) side by side in
-one row, and attention reads the keys and values of each conversation where they are kept (with
-:mod:`agents.vlm.clients.compiled_attention`, those of all in one call). A conversation can begin
-and end at any step.
+longest reply ends. Most of the time goes there: on a CPU, where memory moves slowly, and on a GPU,
+where everybody waits for the longest reply. Here one step processes what is new of each
+conversation (a turn, or the last token of its reply) side by side in one row, and attention reads
+the keys and values of each conversation where they are kept: those of all in one call, with
+:mod:`agents.vlm.clients.compiled_attention` on a CPU and
+:mod:`agents.vlm.clients.triton_attention` on a GPU. A conversation can begin and end at any step.
 
 With the last token of a reply goes a draft of the next ones
 (:mod:`agents.vlm.clients.draft_tokens`). The model's scores after each of them say which token it
@@ -19,7 +20,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any
+from importlib.util import find_spec
+from typing import Any, Protocol
 
 import numpy as np
 import torch
@@ -28,7 +30,8 @@ from numpy.typing import NDArray
 from torch.nn import functional
 from transformers import AttentionInterface
 
-from agents.vlm.clients.compiled_attention import NextTokens, addresses, has_kernel
+from agents.vlm.clients import compiled_attention
+from agents.vlm.clients.compiled_attention import addresses, has_kernel
 from agents.vlm.clients.draft_tokens import DraftTokens
 from agents.vlm.clients.kv_cache import CachedTurns, grown, positions_of, whole_model
 from agents.vlm.clients.padded_batch import EncodedPrompt, new_pictures
@@ -48,6 +51,7 @@ class PackedRow:
         prompt: the conversation.
         sampling: how tokens are drawn.
         scored: whether to keep how likely each token of the reply was.
+        device: of the model.
 
     Attributes:
         prompt: as above.
@@ -58,7 +62,14 @@ class PackedRow:
         source: of the random numbers by which tokens are drawn; None for the likeliest.
     """
 
-    def __init__(self, prompt: EncodedPrompt, sampling: Sampling, *, scored: bool = False) -> None:
+    def __init__(
+        self,
+        prompt: EncodedPrompt,
+        sampling: Sampling,
+        *,
+        scored: bool = False,
+        device: torch.device | None = None,
+    ) -> None:
         self.prompt, self.scored = prompt, scored
         self.said: list[int] = []
         self.scores: list[float] = []
@@ -66,13 +77,18 @@ class PackedRow:
         self.draft: Sequence[int] = ()
         self.source: torch.Generator | None = None
         if sampling.temperature > 0:
-            self.source = torch.Generator().manual_seed(prompt.seed)
+            self.source = torch.Generator(device or "cpu").manual_seed(prompt.seed)
         self._left = sampling.max_tokens
         self._most = len(prompt.ids) + sampling.max_tokens
         self._layers = list(prompt.kept.layers) if prompt.kept is not None else []
         self._addresses: NDArray[np.intp] | None = None
         self._after_prompt = torch.empty(0)
         self._noise: list[torch.Tensor] = []
+
+    @property
+    def known(self) -> bool:
+        """Whether any of it has been processed."""
+        return self.done > 0
 
     @property
     def new(self) -> list[int]:
@@ -86,8 +102,10 @@ class PackedRow:
     def noise(self, words: int) -> Sequence[torch.Tensor]:
         """Random numbers, (words,) each, by which the next token is drawn and one for each of the
         draft. A token of the reply has the same ones whatever the drafts."""
+        assert self.source is not None
         while len(self._noise) <= len(self.draft):
-            self._noise.append(torch.empty(words).exponential_(generator=self.source))
+            empty = torch.empty(words, device=self.source.device)
+            self._noise.append(empty.exponential_(generator=self.source))
         return self._noise[: len(self.draft) + 1]
 
     def go_on(self, drawn: Sequence[int], chances: Sequence[float]) -> None:
@@ -168,7 +186,7 @@ class PackedRow:
 
 
 class PackedModel:
-    """A model on a CPU that generates the replies to several conversations, step by step.
+    """A model that generates the replies to several conversations, step by step.
 
     It never says the token of a picture: with no picture there, the model cannot be given it.
 
@@ -179,9 +197,10 @@ class PackedModel:
     """
 
     def __init__(self, model: Any, image_token: int | None, sampling: Sampling) -> None:
-        self._model, self._image_token = model, image_token
+        self._model, self._image_token, self._sampling = model, image_token, sampling
         self._sampled = SampledScores(sampling.temperature or 1.0, sampling.top_p)
-        self._compiled = model.dtype == torch.float32 and has_kernel()
+        self._device = model.device  # which takes a model a while to find
+        self._kernel = _kernel_for(model)
         whole = whole_model(model)
         if image_token is None:
             whole.set_attn_implementation(_NAME)
@@ -192,7 +211,11 @@ class PackedModel:
         if penalty is not None and penalty != 1:
             self._penalty = transformers.RepetitionPenaltyLogitsProcessor(penalty)
         # The penalty of a token depends on those before it; without the kernel, drafts cost more.
-        self._drafts = DraftTokens() if self._compiled and self._penalty is None else None
+        self._drafts = DraftTokens() if self._kernel and self._penalty is None else None
+
+    def begin(self, prompt: EncodedPrompt, *, scored: bool = False) -> PackedRow:
+        """A conversation whose reply is to be generated; as :class:`PackedRow`."""
+        return PackedRow(prompt, self._sampling, scored=scored, device=self._device)
 
     @torch.inference_mode()
     def step(self, rows: Sequence[PackedRow]) -> None:
@@ -201,10 +224,12 @@ class PackedModel:
             for row in rows:
                 row.guess(self._drafts)
         new = [row.new for row in rows]
-        with _attended(_Attended.of(rows, [len(tokens) for tokens in new], self._compiled)):
+        with _attended(_Attended.of(rows, [len(tokens) for tokens in new], self._kernel)):
             scores = self._model(**self._inputs(rows, new)).logits[0].float()  # (places, words)
         if self._penalty is not None:
-            said = [torch.tensor([row.prompt.ids + row.said]) for row in rows]
+            said = [
+                torch.tensor([row.prompt.ids + row.said], device=scores.device) for row in rows
+            ]
             parts = zip(said, scores.split(1), strict=True)
             scores = torch.cat([self._penalty(ids, one) for ids, one in parts])
         if self._image_token is not None:
@@ -239,27 +264,77 @@ class PackedModel:
         positions = torch.cat(
             [row.positions(self._model, self._image_token) for row in rows], dim=1
         )
-        inputs: dict[str, Any] = {
-            "input_ids": ids,
-            "position_ids": positions,
-            "logits_to_keep": torch.tensor(places),
-            "use_cache": False,
-        }
-        if self._image_token is None:
-            return inputs
-        inputs["position_ids"] = positions[:, None]
-        begun = [row.prompt for row in rows if not row.said]
-        return inputs | new_pictures(begun, ids, self._image_token)
+        inputs = {"input_ids": ids, "position_ids": positions, "logits_to_keep": torch.tensor(places)}
+        if self._image_token is not None:
+            inputs["position_ids"] = positions[:, None]
+            begun = [row.prompt for row in rows if not row.said]
+            inputs |= new_pictures(begun, ids, self._image_token)
+        told: dict[str, Any] = {name: each.to(self._device) for name, each in inputs.items()}
+        return told | {"use_cache": False}
 
 
 def can_be_packed(model: Any) -> bool:
     """Whether :class:`PackedModel` can run a model."""
     config = model.config
     usual = getattr(config, "text_config", config)._attn_implementation == "sdpa"
-    return model.device.type == "cpu" and config.model_type in _FAMILIES and usual
+    return config.model_type in _FAMILIES and usual and _device_can(model)
+
+
+def _device_can(model: Any) -> bool:
+    """Whether a model is where its tokens can be packed: on a CPU, or whole on one GPU for which
+    there is Triton."""
+    if model.device.type != "cuda":
+        return bool(model.device.type == "cpu")
+    places = set(getattr(model, "hf_device_map", {}).values())
+    return len(places) <= 1 and find_spec("triton") is not None
 
 
 # -- attention -------------------------------------------------------------------------------------
+
+
+class _Few(Protocol):
+    """Conversations that are a few tokens longer, of which a kernel does a layer in one call."""
+
+    def attend(
+        self,
+        layer: int,
+        query: torch.Tensor,
+        key: torch.Tensor,
+        value: torch.Tensor,
+        found: torch.Tensor,
+        scale: float,
+    ) -> None: ...
+
+
+class _Kernel(Protocol):
+    """A kernel of attention.
+
+    Attributes:
+        longest: up to how many new tokens of a conversation it is the fastest; within a reply, it
+            always is.
+    """
+
+    longest: int
+
+    def __call__(
+        self,
+        places: Sequence[int],
+        counts: Sequence[int],
+        before: Sequence[int],
+        rooms: Sequence[int],
+        memories: Sequence[NDArray[np.intp]],
+    ) -> _Few: ...
+
+
+def _kernel_for(model: Any) -> _Kernel | None:
+    """The kernel for a model; None if there is none."""
+    if model.device.type == "cuda":
+        from agents.vlm.clients import triton_attention
+
+        return triton_attention.NextTokens
+    if model.dtype == torch.float32 and has_kernel():
+        return compiled_attention.NextTokens
+    return None
 
 
 @dataclass(frozen=True)
@@ -268,24 +343,28 @@ class _Attended:
 
     Attributes:
         longer: those that torch does: each with the place of its first new token and their number.
-        next: those within a reply, which the kernel does; None if there are none.
+        next: those that the kernel does; None if there are none.
     """
 
     longer: Sequence[tuple[PackedRow, int, int]]
-    next: NextTokens | None
+    next: _Few | None
 
     @classmethod
-    def of(cls, rows: Sequence[PackedRow], counts: Sequence[int], kernel: bool) -> _Attended:
-        """Those with so many new tokens each; ``kernel`` says whether there is one."""
+    def of(
+        cls, rows: Sequence[PackedRow], counts: Sequence[int], kernel: _Kernel | None
+    ) -> _Attended:
+        """Those with so many new tokens each."""
         longer, chosen = [], []
         start = 0
         for row, count in zip(rows, counts, strict=True):
-            if kernel and row.said:
+            if kernel is not None and row.known and (row.said or count <= kernel.longest):
                 chosen.append((start, count, row.done, *row.memory(count)))
             else:
                 longer.append((row, start, count))
             start += count
-        return cls(longer, NextTokens(*zip(*chosen, strict=True)) if chosen else None)
+        if kernel is None or not chosen:
+            return cls(longer, None)
+        return cls(longer, kernel(*zip(*chosen, strict=True)))
 
 
 _now: ContextVar[_Attended] = ContextVar("now")
@@ -341,7 +420,10 @@ def _attention(
             found[0, start] = one.reshape(heads, size)
         else:
             old = keys.shape[1] - count
-            mask = torch.ones(count, old + count, dtype=torch.bool).tril(old) if old else None
+            mask = None
+            if old:
+                mask = torch.ones(count, old + count, dtype=torch.bool, device=query.device)
+                mask = mask.tril(old)
             one = functional.scaled_dot_product_attention(
                 asked, keys[None], values[None],
                 attn_mask=mask, is_causal=mask is None, scale=scaling, enable_gqa=groups < heads,

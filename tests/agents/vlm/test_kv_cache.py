@@ -106,7 +106,7 @@ def said(replies: Sequence[Sequence[Reply]]) -> list[list[Any]]:
 
 @pytest.fixture
 def padded(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Batches as on a GPU."""
+    """Whole batches, as for models that cannot be packed."""
     monkeypatch.setattr("agents.vlm.clients.local.can_be_packed", lambda model: False)
 
 
@@ -128,9 +128,24 @@ def test_replies_are_those_of_a_model_that_begins_anew_each_turn(
 ) -> None:
     if way != "packed":
         request.getfixturevalue(way)
+    check_goes_on(models[family], temperature)
+
+
+@pytest.mark.parametrize(("family", "temperature"), [("qwen2", 1.0), ("qwen2_5_vl", 0.0)])
+def test_replies_are_the_same_with_the_kernels_for_a_gpu(
+    models: dict[str, Path], family: str, temperature: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kernels = pytest.importorskip("agents.vlm.clients.triton_attention", reason="needs Triton")
+    monkeypatch.setattr(
+        "agents.vlm.clients.packed_rows._kernel_for", lambda model: kernels.NextTokens
+    )
+    check_goes_on(models[family], temperature)
+
+
+def check_goes_on(path: Path, temperature: float) -> None:
     sampling = {"max_tokens": 12, "temperature": temperature, "top_p": 0.9}
-    anew = client(models[family], sampling=sampling, local={"reuse": False, "batch": 3})
-    goes_on = client(models[family], sampling=sampling, local={"batch": 3})
+    anew = client(path, sampling=sampling, local={"reuse": False, "batch": 3})
+    goes_on = client(path, sampling=sampling, local={"batch": 3})
     expected, found = played(anew, 3), played(goes_on, 3)
     assert said(found) == said(expected)
     for replies in expected:
