@@ -56,6 +56,7 @@ MAY_USE = {
     "agents/vlm/clients/packed_rows.py": ("local",),
     "agents/vlm/clients/padded_batch.py": ("local",),
     "agents/vlm/clients/seeded_sampling.py": ("local",),
+    "agents/vlm/clients/triton_attention.py": ("local",),
     "benchmarks": (),
     "benchmarks/scoring/charts.py": ("charts",),
     "benchmarks/scoring/data_charts.py": ("charts",),
@@ -82,6 +83,7 @@ NOT_OURS_TO_REQUIRE = {
     "imageio_ffmpeg": "asked for by the ending of a name, and the error says what to install",
     "pydantic_core": "the parser of pydantic, which always brings it",
     "trackio": "asked for by an option, whose error says what to install",
+    "triton": "comes with torch for GPUs, and is asked for on a GPU alone",
     "wandb": "asked for by a setting, whose error says what to install",
     "websockets": "how OpenEnv talks, which always brings it",
 }
@@ -107,6 +109,7 @@ USED_OTHERWISE = {
     "sphinx-copybutton": "Sphinx finds it by its name",
     "tensorboard": "torch writes its files by it",
     "tqdm": "Stable-Baselines3 draws its bar by it",
+    "triton": "interprets kernels for a GPU in a test, where it is installed",
     "types-pyyaml": "read by mypy",
 }
 

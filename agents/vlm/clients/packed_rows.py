@@ -227,9 +227,7 @@ class PackedModel:
         with _attended(_Attended.of(rows, [len(tokens) for tokens in new], self._kernel)):
             scores = self._model(**self._inputs(rows, new)).logits[0].float()  # (places, words)
         if self._penalty is not None:
-            said = [
-                torch.tensor([row.prompt.ids + row.said], device=scores.device) for row in rows
-            ]
+            said = [torch.tensor([row.prompt.ids + row.said], device=scores.device) for row in rows]
             parts = zip(said, scores.split(1), strict=True)
             scores = torch.cat([self._penalty(ids, one) for ids, one in parts])
         if self._image_token is not None:
@@ -264,7 +262,8 @@ class PackedModel:
         positions = torch.cat(
             [row.positions(self._model, self._image_token) for row in rows], dim=1
         )
-        inputs = {"input_ids": ids, "position_ids": positions, "logits_to_keep": torch.tensor(places)}
+        inputs = {"input_ids": ids, "position_ids": positions}
+        inputs["logits_to_keep"] = torch.tensor(places)
         if self._image_token is not None:
             inputs["position_ids"] = positions[:, None]
             begun = [row.prompt for row in rows if not row.said]

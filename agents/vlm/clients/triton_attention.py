@@ -88,9 +88,7 @@ def _attend(
         fade = tl.exp(most - higher)
         total = total * fade + tl.sum(weights, axis=1)
         some = tl.load(values + at, mask=there, other=0)
-        sums = sums * fade[:, None] + tl.dot(
-            weights.to(some.dtype), some, input_precision="ieee"
-        )
+        sums = sums * fade[:, None] + tl.dot(weights.to(some.dtype), some, input_precision="ieee")
         most = higher
     to = (source * heads + head[:, None]) * SIZE + part
     tl.store(found + to, (sums / total[:, None]).to(found.dtype.element_ty), mask=asked)

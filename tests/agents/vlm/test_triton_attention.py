@@ -1,6 +1,6 @@
 """The kernels of attention for a GPU find what torch finds.
 
-Where there is no GPU, Triton interprets them on the CPU (tests/conftest.py), in float32 and float16.
+Where there is no GPU, Triton interprets them (tests/conftest.py), in float32 and float16.
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ BEFORE = [0, 1, 14, 15, 63, 64, 130]
 """Tokens of the conversations before the new ones: around the 64 that are read at once."""
 NEW = [1, 2, 17, 1, 9, 33, 1]
 """New tokens of each: around the 16 that are done at once."""
-ROOMS = [before + new + number % 3 for number, (before, new) in enumerate(zip(BEFORE, NEW))]
+ROOMS = [
+    before + new + number % 3 for number, (before, new) in enumerate(zip(BEFORE, NEW, strict=True))
+]
 PLACES = [number + 1 + sum(NEW[:number]) for number in range(len(NEW))]
 """Where the new tokens of each are; others lie between."""
 TOKENS = len(NEW) + 1 + sum(NEW)
