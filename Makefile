@@ -5,6 +5,7 @@
 # make docs     build the documentation site in build/docs; open build/docs/index.html
 # make cover    run the tests and say which lines they do not reach (half as slow again)
 # make test-inspect   run the tests of er-gym inspect, with the extra that they need
+# make test-triton    run the tests of the kernels for a GPU, with Triton beside the environment
 # make clean    remove what these left behind, the virtual environment included; runs/ stays
 #
 # Each does the set-up that it needs in $(VENV), once. Another Python: make bench PYTHON=python3.12
@@ -24,7 +25,7 @@ INSTALL := $(PIP) install --quiet --no-compile --constraint constraints.txt
 SHOWN := $(PYTHON) -m benchmarks.checks.shown
 MARK := $(VENV)/.er-gym
 
-.PHONY: bench test docs test-inspect cover lint check clean help
+.PHONY: bench test docs test-inspect test-triton cover lint check clean help
 .DELETE_ON_ERROR:
 
 help:
@@ -48,6 +49,13 @@ cover: $(MARK)-dev
 test-inspect: $(MARK)-dev
 	@$(SHOWN) 'Installing Inspect in $(VENV)' $(VENV) $(INSTALL) --editable '.[dev,inspect]'
 	$(BIN)/python -m pytest tests/benchmarks/test_inspect_task.py $(ARGS)
+
+# Beside the environment: torch imports Triton wherever it finds it, and some releases of Triton
+# print lines at the end of every program.
+test-triton: $(MARK)-dev
+	$(BIN)/python -m pip install --quiet --upgrade --no-deps --target build/triton triton
+	PYTHONPATH=build/triton $(BIN)/python -m pytest -n 0 tests/agents/vlm/test_triton_attention.py \
+	  tests/agents/vlm/test_kv_cache.py $(ARGS)
 
 check: lint test
 

@@ -109,7 +109,6 @@ USED_OTHERWISE = {
     "sphinx-copybutton": "Sphinx finds it by its name",
     "tensorboard": "torch writes its files by it",
     "tqdm": "Stable-Baselines3 draws its bar by it",
-    "triton": "interprets kernels for a GPU in a test, where it is installed",
     "types-pyyaml": "read by mypy",
 }
 

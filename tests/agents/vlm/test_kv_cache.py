@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from tiny_qwen import make_tiny_qwen
 from agents.vlm.chat import LEFT_OUT, Message, Picture, Reply
 from agents.vlm.clients.kv_cache import CachedTurns, ConversationCache, conversation_name
 from agents.vlm.clients.local import LocalClient
+from agents.vlm.clients.packed_rows import can_be_packed
 from agents.vlm.pictures import encode
 from agents.vlm.settings import AgentSettings, Pictures
 
@@ -135,11 +137,42 @@ def test_replies_are_those_of_a_model_that_begins_anew_each_turn(
 def test_replies_are_the_same_with_the_kernels_for_a_gpu(
     models: dict[str, Path], family: str, temperature: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kernels = pytest.importorskip("agents.vlm.clients.triton_attention", reason="needs Triton")
+    kernels = pytest.importorskip(
+        "agents.vlm.clients.triton_attention", reason="needs Triton: make test-triton"
+    )
     monkeypatch.setattr(
         "agents.vlm.clients.packed_rows._kernel_for", lambda model: kernels.NextTokens
     )
     check_goes_on(models[family], temperature)
+
+
+@pytest.mark.parametrize(
+    ("device", "places", "triton", "packed"),
+    [
+        ("cpu", {}, False, True),
+        ("cuda:0", {}, True, True),
+        ("cuda:0", {"": 0}, True, True),
+        ("cuda:0", {"model.layers.0": 0, "model.layers.1": 1}, True, False),
+        ("cuda:0", {"model": 0, "lm_head": "cpu"}, True, False),
+        ("cuda:0", {}, False, False),
+        ("mps", {}, True, False),
+    ],
+)
+def test_tokens_are_packed_on_a_cpu_and_whole_on_one_gpu_with_triton(
+    device: str,
+    places: dict[str, Any],
+    triton: bool,
+    packed: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(
+        "agents.vlm.clients.packed_rows.find_spec", lambda name: object() if triton else None
+    )
+    config = SimpleNamespace(model_type="qwen2", _attn_implementation="sdpa")
+    model = SimpleNamespace(config=config, device=torch.device(device), hf_device_map=places)
+    assert can_be_packed(model) is packed
+    config._attn_implementation = "eager"
+    assert not can_be_packed(model)
 
 
 def check_goes_on(path: Path, temperature: float) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import pytest
 
 pytest.importorskip("torch", reason="needs the extra local")
-pytest.importorskip("triton", reason="needs Triton, which comes with torch for GPUs")
+pytest.importorskip("triton", reason="needs Triton: make test-triton")
 
 import torch
 from torch.nn import functional
