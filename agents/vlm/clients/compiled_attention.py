@@ -76,7 +76,7 @@ class NextTokens:
         memories: the :func:`addresses` of each.
     """
 
-    longest = 0  # of a turn; torch is faster with those
+    longest = 0  # torch is faster with what is not within a reply
 
     def __init__(
         self,

@@ -86,11 +86,6 @@ class PackedRow:
         self._noise: list[torch.Tensor] = []
 
     @property
-    def known(self) -> bool:
-        """Whether any of it has been processed."""
-        return self.done > 0
-
-    @property
     def new(self) -> list[int]:
         """The tokens to be processed next, the draft last."""
         return [*(self.said[-1:] or self.prompt.ids[self.done :]), *self.draft]
@@ -309,8 +304,8 @@ class _Kernel(Protocol):
     """A kernel of attention.
 
     Attributes:
-        longest: up to how many new tokens of a conversation it is the fastest; within a reply, it
-            always is.
+        longest: how many new tokens of a conversation it takes before the reply; within one, it
+            takes all.
     """
 
     longest: int
@@ -356,7 +351,7 @@ class _Attended:
         longer, chosen = [], []
         start = 0
         for row, count in zip(rows, counts, strict=True):
-            if kernel is not None and row.known and (row.said or count <= kernel.longest):
+            if kernel is not None and row.done and (row.said or count <= kernel.longest):
                 chosen.append((start, count, row.done, *row.memory(count)))
             else:
                 longer.append((row, start, count))
