@@ -110,7 +110,7 @@ class NextTokens:
         Raises:
             MemoryError: there is none left.
         """
-        query, key, value = (_with_whole_heads(part) for part in (query, key, value))
+        query, key, value = (with_whole_heads(part) for part in (query, key, value))
         strides = [part.stride(axis) for part in (query, key, value) for axis in (1, 2)]
         told = _Layer(
             self._numbers.shape[1], query.shape[1], key.shape[1], query.shape[3],
@@ -122,6 +122,6 @@ class NextTokens:
             raise MemoryError("no memory is left for attention")
 
 
-def _with_whole_heads(part: torch.Tensor) -> torch.Tensor:
+def with_whole_heads(part: torch.Tensor) -> torch.Tensor:
     """With the numbers of a head side by side."""
     return part if part.stride(3) == 1 else part.contiguous()

@@ -18,6 +18,8 @@ import triton
 import triton.language as tl
 from numpy.typing import NDArray
 
+from agents.vlm.clients.compiled_attention import with_whole_heads
+
 LONGEST = 256
 """The most new tokens of a conversation that is not within a reply: turns, but not instructions.
 The kept keys and values are read once for every few of them, which torch does not do. Chosen
@@ -133,7 +135,7 @@ class NextTokens:
             found: (1, new tokens, heads, size), in one piece.
             scale: of the scores.
         """
-        query, key, value = (_with_whole_heads(part) for part in (query, key, value))
+        query, key, value = (with_whole_heads(part) for part in (query, key, value))
         _, heads, _, size = query.shape
         groups = key.shape[1]
         shared = heads // groups
@@ -169,8 +171,3 @@ class NextTokens:
                 torch.from_numpy(numbers).to(device), torch.from_numpy(memories).to(device)
             )  # fmt: skip
         return self._on_device
-
-
-def _with_whole_heads(part: torch.Tensor) -> torch.Tensor:
-    """With the numbers of a head side by side."""
-    return part if part.stride(3) == 1 else part.contiguous()
