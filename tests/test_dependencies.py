@@ -53,6 +53,7 @@ MAY_USE = {
     "agents/vlm/clients/local.py": ("local",),
     "agents/vlm/clients/merging.py": ("local",),
     "agents/vlm/clients/model_actors.py": ("local", "ray"),
+    "agents/vlm/clients/next_tokens.py": ("local",),
     "agents/vlm/clients/packed_rows.py": ("local",),
     "agents/vlm/clients/padded_batch.py": ("local",),
     "agents/vlm/clients/seeded_sampling.py": ("local",),

@@ -7,16 +7,13 @@ values where they are kept. Torch takes calls and views for each of them, and ha
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 
-from agents.vlm.clients.kv_cache import Layers
+from agents.vlm.clients.next_tokens import NextTokens, with_whole_heads
 from er_gym.shared_library import compiled
 
 _SOURCE = Path(__file__).with_name("attention.c")
@@ -59,35 +56,10 @@ def has_kernel() -> bool:
     return _kernel() is not None
 
 
-def addresses(layers: Layers) -> NDArray[np.intp]:
-    """Where the keys and values of each layer are, (layers, 2)."""
-    return np.array([[part.data_ptr() for part in layer] for layer in layers], np.intp)
-
-
-class NextTokens:
-    """The conversations of a batch that are a few tokens longer.
-
-    Args:
-        places: of the first token of each among the new ones of the batch.
-        counts: how many new ones each has, side by side; the time is that of as many conversations.
-        before: how many tokens each had before.
-        rooms: for how many tokens the memory of each has room: those before and the new ones at
-            least.
-        memories: the :func:`addresses` of each.
-    """
+class CompiledAttention(NextTokens):
+    """On a CPU, in float32. The time is that of as many conversations as there are new tokens."""
 
     longest = 0  # torch is faster with what is not within a reply
-
-    def __init__(
-        self,
-        places: Sequence[int],
-        counts: Sequence[int],
-        before: Sequence[int],
-        rooms: Sequence[int],
-        memories: Sequence[NDArray[np.intp]],
-    ) -> None:
-        self._numbers = np.array([places, counts, before, rooms], np.intp)
-        self._memories = np.stack(memories, axis=-1)  # (layers, 2, conversations)
 
     def attend(
         self,
@@ -98,18 +70,7 @@ class NextTokens:
         found: torch.Tensor,
         scale: float,
     ) -> None:
-        """Keep the new keys and values in a layer, and write what attention finds.
-
-        Args:
-            layer: its number.
-            query: (1, heads, new tokens of the batch, size), float32.
-            key, value: the same with the heads of keys and values.
-            found: (1, new tokens, heads, size), in one piece.
-            scale: of the scores.
-
-        Raises:
-            MemoryError: there is none left.
-        """
+        """As :meth:`NextTokens.attend`."""
         query, key, value = (with_whole_heads(part) for part in (query, key, value))
         strides = [part.stride(axis) for part in (query, key, value) for axis in (1, 2)]
         told = _Layer(
@@ -120,8 +81,3 @@ class NextTokens:
         )  # fmt: skip
         if _kernel()(told):
             raise MemoryError("no memory is left for attention")
-
-
-def with_whole_heads(part: torch.Tensor) -> torch.Tensor:
-    """With the numbers of a head side by side."""
-    return part if part.stride(3) == 1 else part.contiguous()

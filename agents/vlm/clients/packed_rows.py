@@ -21,7 +21,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
@@ -30,10 +30,10 @@ from numpy.typing import NDArray
 from torch.nn import functional
 from transformers import AttentionInterface
 
-from agents.vlm.clients import compiled_attention
-from agents.vlm.clients.compiled_attention import addresses, has_kernel
+from agents.vlm.clients.compiled_attention import CompiledAttention, has_kernel
 from agents.vlm.clients.draft_tokens import DraftTokens
 from agents.vlm.clients.kv_cache import CachedTurns, grown, positions_of, whole_model
+from agents.vlm.clients.next_tokens import NextTokens, addresses
 from agents.vlm.clients.padded_batch import EncodedPrompt, new_pictures
 from agents.vlm.clients.seeded_sampling import SampledScores, never_drawn, with_noise
 from agents.vlm.settings import Sampling
@@ -286,48 +286,14 @@ def _device_can(model: Any) -> bool:
 # -- attention -------------------------------------------------------------------------------------
 
 
-class _Few(Protocol):
-    """Conversations that are a few tokens longer, of which a kernel does a layer in one call."""
-
-    def attend(
-        self,
-        layer: int,
-        query: torch.Tensor,
-        key: torch.Tensor,
-        value: torch.Tensor,
-        found: torch.Tensor,
-        scale: float,
-    ) -> None: ...
-
-
-class _Kernel(Protocol):
-    """A kernel of attention.
-
-    Attributes:
-        longest: how many new tokens of a conversation it takes before the reply; within one, it
-            takes all.
-    """
-
-    longest: int
-
-    def __call__(
-        self,
-        places: Sequence[int],
-        counts: Sequence[int],
-        before: Sequence[int],
-        rooms: Sequence[int],
-        memories: Sequence[NDArray[np.intp]],
-    ) -> _Few: ...
-
-
-def _kernel_for(model: Any) -> _Kernel | None:
+def _kernel_for(model: Any) -> type[NextTokens] | None:
     """The kernel for a model; None if there is none."""
     if model.device.type == "cuda":
-        from agents.vlm.clients import triton_attention
+        from agents.vlm.clients.triton_attention import TritonAttention
 
-        return triton_attention.NextTokens
+        return TritonAttention
     if model.dtype == torch.float32 and has_kernel():
-        return compiled_attention.NextTokens
+        return CompiledAttention
     return None
 
 
@@ -341,11 +307,11 @@ class _Attended:
     """
 
     longer: Sequence[tuple[PackedRow, int, int]]
-    next: _Few | None
+    next: NextTokens | None
 
     @classmethod
     def of(
-        cls, rows: Sequence[PackedRow], counts: Sequence[int], kernel: _Kernel | None
+        cls, rows: Sequence[PackedRow], counts: Sequence[int], kernel: type[NextTokens] | None
     ) -> _Attended:
         """Those with so many new tokens each."""
         longer, chosen = [], []

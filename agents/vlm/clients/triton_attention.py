@@ -9,21 +9,15 @@ Triton comes with torch for GPUs, and is imported by nothing but this module.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import torch
 import triton
 import triton.language as tl
-from numpy.typing import NDArray
 
-from agents.vlm.clients.compiled_attention import with_whole_heads
+from agents.vlm.clients.next_tokens import NextTokens, with_whole_heads
 
-LONGEST = 256
-"""The most new tokens of a conversation that is not within a reply: turns, but not instructions.
-The kept keys and values are read once for every few of them, which torch does not do. Chosen
-without a measurement."""
 _QUERIES = 16  # of a tile: new tokens times the heads that share keys. Matrix units take no fewer.
 _KEYS = 64  # that are read at once
 
@@ -97,25 +91,14 @@ def _attend(
     tl.store(found + to, (sums / total[:, None]).to(found.dtype.element_ty), mask=asked)
 
 
-class NextTokens:
-    """The conversations of a batch that are some tokens longer; as
-    :class:`agents.vlm.clients.compiled_attention.NextTokens`, and its memories are on one GPU."""
+class TritonAttention(NextTokens):
+    """On one GPU."""
 
-    longest = LONGEST
+    # Turns, but not instructions: the kept keys and values are read once for every few new tokens,
+    # which torch does not do. Chosen without a measurement.
+    longest = 256
 
-    def __init__(
-        self,
-        places: Sequence[int],
-        counts: Sequence[int],
-        before: Sequence[int],
-        rooms: Sequence[int],
-        memories: Sequence[NDArray[np.intp]],
-    ) -> None:
-        self._counts = counts
-        self._numbers = np.array([places, counts, before, rooms], np.int64)
-        self._memories = np.stack(memories, axis=-1).astype(np.int64)  # (layers, 2, conversations)
-        self._on_device: tuple[torch.Tensor, torch.Tensor] | None = None
-        self._tiles = 0
+    _on_device: tuple[torch.Tensor, torch.Tensor] | None = None
 
     def attend(
         self,
@@ -126,15 +109,7 @@ class NextTokens:
         found: torch.Tensor,
         scale: float,
     ) -> None:
-        """Keep the new keys and values in a layer, and write what attention finds.
-
-        Args:
-            layer: its number.
-            query: (1, heads, new tokens of the batch, size).
-            key, value: the same with the heads of keys and values.
-            found: (1, new tokens, heads, size), in one piece.
-            scale: of the scores.
-        """
+        """As :meth:`NextTokens.attend`."""
         query, key, value = (with_whole_heads(part) for part in (query, key, value))
         _, heads, _, size = query.shape
         groups = key.shape[1]
@@ -142,15 +117,16 @@ class NextTokens:
         each = triton.next_power_of_2(shared)
         tokens = max(1, _QUERIES // each)
         numbers, memories = self._told(tokens, query.device)
-        grid = (self._tiles, groups)
         rows = self._numbers.shape[1]
+        tiles = (len(numbers) - 4 * rows) // 2
+        grid = (tiles, groups)
         sizes: dict[str, Any] = {
             "TOKENS": tokens, "SIZE": size, "WIDTH": max(16, triton.next_power_of_2(size)),
         }  # fmt: skip
         strides = [part.stride(axis) for part in (key, value) for axis in (1, 2)]
-        _keep[grid](key, value, numbers, memories[layer], rows, self._tiles, *strides, **sizes)
+        _keep[grid](key, value, numbers, memories[layer], rows, tiles, *strides, **sizes)
         _attend[grid](
-            query, found, numbers, memories[layer], rows, self._tiles,
+            query, found, numbers, memories[layer], rows, tiles,
             query.stride(1), query.stride(2), heads, scale,
             **sizes, SHARED=shared, EACH=each, KEYS=_KEYS,
         )  # fmt: skip
@@ -161,11 +137,10 @@ class NextTokens:
         if self._on_device is None:
             tiles = [
                 (row, first)
-                for row, count in enumerate(self._counts)
+                for row, count in enumerate(self._numbers[1])
                 for first in range(0, count, tokens)
             ]
-            self._tiles = len(tiles)
-            numbers = np.concatenate([self._numbers.ravel(), np.array(tiles, np.int64).T.ravel()])
+            numbers = np.concatenate([self._numbers.ravel(), np.array(tiles, np.intp).T.ravel()])
             memories = self._memories.reshape(len(self._memories), -1)
             self._on_device = (
                 torch.from_numpy(numbers).to(device), torch.from_numpy(memories).to(device)

@@ -9,8 +9,9 @@ pytest.importorskip("torch", reason="needs the extra local")
 import torch
 from torch.nn import functional
 
-from agents.vlm.clients.compiled_attention import NextTokens, addresses, has_kernel
+from agents.vlm.clients.compiled_attention import CompiledAttention, has_kernel
 from agents.vlm.clients.kv_cache import CachedTurns
+from agents.vlm.clients.next_tokens import addresses
 from agents.vlm.clients.packed_rows import PackedRow
 from agents.vlm.clients.padded_batch import EncodedPrompt
 from agents.vlm.settings import Sampling
@@ -50,7 +51,7 @@ def test_each_conversation_attends_to_its_own_tokens(
     )
     found = torch.full((1, tokens, heads, size), torch.nan)
     whole = [before + room for before, room in zip(BEFORE, rooms, strict=True)]
-    ones = NextTokens(places, NEW, BEFORE, whole, [addresses(each) for each in memories])
+    ones = CompiledAttention(places, NEW, BEFORE, whole, [addresses(each) for each in memories])
     before = [[part.clone() for part in memory[0]] for memory in memories]
     ones.attend(1, query, key, value, found, size**-0.5)
     written = torch.zeros(tokens, dtype=torch.bool)
@@ -76,7 +77,9 @@ def test_scores_of_any_size_give_no_overflow() -> None:
     query = torch.randn(1, 1, 1, 32, generator=generator) * 1e4
     key, value = torch.randn(2, 1, 1, 1, 32, generator=generator)
     found = torch.empty(1, 1, 1, 32)
-    NextTokens([0], [1], [40], [41], [addresses(memory)]).attend(0, query, key, value, found, 1.0)
+    CompiledAttention([0], [1], [40], [41], [addresses(memory)]).attend(
+        0, query, key, value, found, 1.0
+    )
     keys, values = memory[0]
     wanted = functional.scaled_dot_product_attention(query, keys[None], values[None], scale=1.0)
     torch.testing.assert_close(found[:, 0], wanted[:, :, 0])

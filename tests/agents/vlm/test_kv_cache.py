@@ -141,7 +141,7 @@ def test_replies_are_the_same_with_the_kernels_for_a_gpu(
         "agents.vlm.clients.triton_attention", reason="needs Triton: make test-triton"
     )
     monkeypatch.setattr(
-        "agents.vlm.clients.packed_rows._kernel_for", lambda model: kernels.NextTokens
+        "agents.vlm.clients.packed_rows._kernel_for", lambda model: kernels.TritonAttention
     )
     check_goes_on(models[family], temperature)
 

@@ -13,8 +13,8 @@ pytest.importorskip("triton", reason="needs Triton: make test-triton")
 import torch
 from torch.nn import functional
 
-from agents.vlm.clients.compiled_attention import addresses
-from agents.vlm.clients.triton_attention import NextTokens
+from agents.vlm.clients.next_tokens import addresses
+from agents.vlm.clients.triton_attention import TritonAttention
 
 DEVICE = "cuda" if torch.cuda.is_available() else "cpu"
 TYPES = {"float32": 2e-6, "float16": 2e-3}
@@ -52,7 +52,7 @@ def test_each_conversation_attends_to_its_own_tokens(
     query = drawn(1, heads, TOKENS, size, kind=kind)
     key, value = (drawn(1, TOKENS, groups, size, kind=kind).transpose(1, 2) for _ in range(2))
     found = torch.full((1, TOKENS, heads, size), torch.nan, dtype=kind, device=DEVICE)
-    ones = NextTokens(PLACES, NEW, BEFORE, ROOMS, [addresses(each) for each in memories])
+    ones = TritonAttention(PLACES, NEW, BEFORE, ROOMS, [addresses(each) for each in memories])
     ones.attend(1, query, key, value, found, 0.2)
     written = torch.zeros(TOKENS, dtype=torch.bool, device=DEVICE)
     for number, (place, count, old) in enumerate(zip(PLACES, NEW, BEFORE, strict=True)):
@@ -80,7 +80,7 @@ def test_scores_of_any_size_give_no_overflow() -> None:
     query = drawn(1, 1, 1, 32, kind=torch.float32) * 1e4
     key, value = drawn(2, 1, 1, 1, 32, kind=torch.float32)
     found = torch.empty(1, 1, 1, 32, device=DEVICE)
-    ones = NextTokens([0], [1], [40], [41], [addresses(memory)])
+    ones = TritonAttention([0], [1], [40], [41], [addresses(memory)])
     ones.attend(0, query, key, value, found, 1.0)
     keys, values = memory[0]
     wanted = functional.scaled_dot_product_attention(query, keys[None], values[None], scale=1.0)
