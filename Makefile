@@ -55,7 +55,7 @@ test-inspect: $(MARK)-dev
 test-triton: $(MARK)-dev
 	$(BIN)/python -m pip install --quiet --upgrade --no-deps --target build/triton triton
 	PYTHONPATH=build/triton $(BIN)/python -m pytest -n 0 tests/agents/vlm/test_triton_attention.py \
-	  tests/agents/vlm/test_kv_cache.py $(ARGS)
+	  tests/agents/vlm/test_kv_cache.py::test_replies_are_the_same_with_the_kernels_for_a_gpu $(ARGS)
 
 check: lint test
 

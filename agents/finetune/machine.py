@@ -38,9 +38,8 @@ def share_gpus() -> bool:
     """Let the processes of this machine share its GPUs if there are more processes; says whether
     they do.
 
-    Several processes are worth while where a model is so small that to play takes longer in Python
-    than on the GPU. accelerate takes the number of a process for that of its GPU, which then is
-    not there.
+    One process that plays with a small model does not fill a GPU. accelerate takes the number of a
+    process for that of its GPU, which then is not there.
     """
     gpus = torch.cuda.device_count()
     if not 0 < gpus < int(os.environ.get("LOCAL_WORLD_SIZE", "1")):
