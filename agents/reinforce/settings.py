@@ -24,6 +24,8 @@ class PlaySettings(StrictSettings):
     Attributes:
         tasks: how many tasks of the suite are played before each update, by all processes together.
         group: how often each of them is played: the episodes that are compared with each other.
+        starts: where these episodes begin. At the ``beginning``; or each task is played once, and
+            they go on from there right after a ``refusal``, where the model met one.
         temperature: at which replies are drawn. Ratios are of the model at this temperature.
         max_tokens: the most tokens of a reply; None for what the model was tuned for.
         concurrency: the most conversations at once in a process.
@@ -33,6 +35,7 @@ class PlaySettings(StrictSettings):
 
     tasks: Positive = 16
     group: Positive = 8
+    starts: Literal["beginning", "refusal"] = "beginning"
     temperature: float = Field(1.0, gt=0, le=10)
     max_tokens: Positive | None = None
     concurrency: Positive = 64

@@ -83,6 +83,7 @@ from agents.reinforce.run_files import (
     rewind,
 )
 from agents.reinforce.settings import ReinforceSettings
+from agents.reinforce.starts import after_refusals
 from agents.vlm.clients.checkpoint import checkpoint_in_memory
 from agents.vlm.clients.local import LocalClient
 from agents.vlm.matching import Matcher
@@ -94,6 +95,8 @@ from er_gym.rollout.run_directory import Manifest
 from er_gym.tasks.suites import Suite
 from er_gym.tasks.task import Task
 
+CONTINUED = "continued"
+"""What the log calls episodes that went on from a state of another."""
 _CPU_LENGTHS = 32  # lengths of batches are multiples, as in fine-tuning
 
 
@@ -321,7 +324,12 @@ def _reinforce(
         def seed(key: str, update: int = update) -> int:
             return _seed(training.seed, update, key)
 
-        jobs = group_jobs(tasks[process::processes], settings.play.group, seed)
+        mine, group = tasks[process::processes], settings.play.group
+        whole, jobs = (
+            after_refusals(samplers["play"], mine, group, seed)
+            if settings.play.starts == "refusal"
+            else (None, group_jobs(mine, group, seed))
+        )
         played = samplers["play"].play(jobs, forks=row.values)
         episodes, continued = [episode for _, episode, _ in played], 0
         if row.values:
@@ -336,7 +344,10 @@ def _reinforce(
         playing.refresh()
 
         # what all processes have seen
-        lines = gather_object(lines)
+        lines, on = gather_object(lines), list[dict[str, Any]]()
+        if whole is not None:  # what was learnt from are only the ends of episodes
+            on, lines = lines, gather_object(_lines(whole, settings, update))
+            continued += len(episodes)
         skipped = gather_object(skipped)
         continued = sum(gather_object([continued]))
         seconds = time.monotonic() - began
@@ -357,6 +368,7 @@ def _reinforce(
         line = {
             "update": update,
             **_of_episodes(lines),
+            **{f"{CONTINUED}/{name}": value for name, value in _of_episodes(on).items() if on},
             "groups_skipped": fmean(skipped) if skipped else 1.0,
             **figures,
             **{f"success/{name}": value for name, value in sorted(state.success.items())},
@@ -374,7 +386,7 @@ def _reinforce(
             validation = line["validation/success"]
             state, best = _with_best(state, best, validation, settings, network)
         if first:
-            append_lines(run.path / EPISODES, lines)
+            append_lines(run.path / EPISODES, [*lines, *(each | {CONTINUED: True} for each in on)])
             append_lines(run.path / METRICS, [line])
             for name, value in line.items():
                 board.add_scalar(name, value, update)
@@ -460,6 +472,13 @@ def _rows(
                 keep_all=bool(objective.entropy or objective.kl),
             )
     return rows, lines, skipped
+
+
+def _lines(
+    episodes: Sequence[Episode], settings: ReinforceSettings, update: int
+) -> list[dict[str, Any]]:
+    """A line for the log of each."""
+    return [_line(e, rewards_of(e.record, settings.rewards), update) for e in episodes]
 
 
 def _line(episode: Episode, rewards: dict[str, list[float]], update: int) -> dict[str, Any]:

@@ -113,6 +113,11 @@ def test_after_a_kill_it_goes_on_as_if_nothing_had_been(
             "training": {"steps": 2},
             "validation": {"suite": "mini", "tasks": 1, "every": 1, "best": True},
         },
+        {
+            "objective": {"kl": 0.1},
+            "play": {"starts": "refusal", "group": 3, "concurrency": 4},
+            "training": {"steps": 2},
+        },
     ],
 )
 def test_each_way_of_learning_runs(
@@ -123,7 +128,14 @@ def test_each_way_of_learning_runs(
     [*_, line] = curve(result.path)
     assert line["kl"] >= 0
     assert line["gradient_norm"] > 0
-    assert (line["continued"] > 0) == (more["advantage"]["row"] == "branches")
+    after = made.play.starts == "refusal"
+    assert (line["continued"] > 0) == (after or made.advantage.row == "branches")
+    logged = [bool(each.get("continued")) for each in lines_of(result.path / EPISODES)]
+    assert (logged.count(False), logged.count(True)) == (
+        (1, 3) if after else (made.play.group, 0)
+    )  # from the beginning, and from there on
+    assert ("continued/reward" in line) == after
+    assert line["episodes"] == result.episodes == logged.count(False)
     assert (result.path / "model").is_dir()
     assert len(result.validation) == (2 if "validation" in more else 0)
 

@@ -1,0 +1,58 @@
+"""Where the episodes of a group begin: at the beginning, or where the model goes wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from random import Random
+
+from agents.reinforce.episodes import Episode, steps_of
+from agents.reinforce.player import Job, Sampler, group_jobs
+from er_gym.tasks.task import Task
+
+
+def after_refusals(
+    sampler: Sampler, tasks: Sequence[Task], group: int, seed: Callable[[str], int]
+) -> tuple[list[Episode], list[Job]]:
+    """Play each task once, and go back to where an action was refused.
+
+    A model that says the refused action again, almost for sure, seldom shows itself another way:
+    few of its episodes from the beginning tell what that would bring. So a whole group goes on from
+    such a place. Episodes in which nothing was refused have none.
+
+    Args:
+        sampler: plays.
+        tasks: what is played.
+        group: how often an episode is continued.
+        seed: gives that of an episode's key.
+
+    Returns:
+        the episodes from the beginning; and the groups' jobs, each of which takes up environment
+        and conversation right after a refused action, drawn at random among those of its episode.
+    """
+    whole, jobs = [], []
+    for job, episode, player in sampler.play(group_jobs(tasks, 1, seed), forks=True):
+        whole.append(episode)
+        places = turns_after_refusals(episode)
+        if not places:
+            continue
+        turn = Random(job.seed).choice(places)
+        for number in range(1, group + 1):
+            key = f"{job.key}/{turn}/{number}"
+            jobs.append(
+                replace(
+                    job,
+                    key=key,
+                    sample=number,
+                    seed=seed(key),
+                    agent=player.forks[turn],
+                    snapshot=player.snapshots[turn],
+                )
+            )
+    return whole, jobs
+
+
+def turns_after_refusals(episode: Episode) -> list[int]:
+    """The turns, from 0, before which an action was not possible."""
+    steps = steps_of(episode.record)
+    return [turn for turn in range(1, len(steps)) if not steps[turn - 1].success]

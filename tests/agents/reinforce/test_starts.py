@@ -1,0 +1,79 @@
+"""Where groups begin: right after an action that was refused, each time in the same state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any, cast
+from zlib import crc32
+
+import pytest
+
+from agents.reinforce.episodes import Episode, Turn
+from agents.reinforce.player import Job
+from agents.reinforce.starts import after_refusals, turns_after_refusals
+from er_gym.rollout.records import EpisodeRecord, StepRecord
+
+
+def episode(*legal: bool, appended: bool = False) -> Episode:
+    """One in which these actions were possible."""
+    steps = [StepRecord(verb="init", success=True)]
+    steps += [StepRecord(verb="open", success=each) for each in legal]
+    if appended:
+        steps.append(StepRecord(verb="end", success=True, appended=True))
+    record = EpisodeRecord(
+        task_id="t", task_type="single_search", scene="FloorPlan1", instruction="?", name="?",
+        key_actions=[], max_steps=10, agent="a", seed=0, success=False, end_reason="end",
+        total_reward=0.0, seconds=0.0, steps=steps,
+    )  # fmt: skip
+    return Episode(record, tuple(Turn([1], [2], [], "x") for _ in legal))
+
+
+@pytest.mark.parametrize(
+    ("legal", "turns"),
+    [
+        ((), []),
+        ((True, True), []),
+        ((False, True, True), [1]),
+        ((True, False, False, True), [2, 3]),
+        ((True, False), []),  # nothing was said after it
+    ],
+)
+def test_the_turns_after_a_refusal(legal: tuple[bool, ...], turns: list[int]) -> None:
+    assert turns_after_refusals(episode(*legal)) == turns
+    assert turns_after_refusals(episode(*legal, appended=True)) == turns
+
+
+def test_a_group_goes_on_from_one_state() -> None:
+    played = {"a": (False, True, False, True), "b": (True, True)}
+
+    def play(jobs: Sequence[Job], *, forks: bool) -> list[tuple[Job, Episode, Any]]:
+        assert forks
+        return [
+            (
+                job,
+                episode(*played[job.task.id]),
+                SimpleNamespace(
+                    forks=[f"{job.task.id}{turn}" for turn in range(4)],
+                    snapshots=[f"{job.task.id}{turn}".encode() for turn in range(4)],
+                ),
+            )
+            for job in jobs
+        ]
+
+    tasks: Any = [cast(Any, SimpleNamespace(id=name)) for name in played]
+    sampler: Any = SimpleNamespace(play=play)
+    drawn: set[str] = set()
+    for number in range(20):
+
+        def seed(key: str, number: int = number) -> int:
+            return crc32(f"{number}/{key}".encode())
+
+        whole, jobs = after_refusals(sampler, tasks, 3, seed)
+        assert [len(each.turns) for each in whole] == [4, 2]
+        assert [(job.task.id, job.sample) for job in jobs] == [("a", 1), ("a", 2), ("a", 3)]
+        assert len({job.key for job in jobs}) == len({job.seed for job in jobs}) == 3
+        [(agent, snapshot)] = {(str(job.agent), job.snapshot) for job in jobs}
+        assert agent.encode() == snapshot
+        drawn.add(agent)
+    assert drawn == {"a1", "a3"}
