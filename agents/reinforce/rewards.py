@@ -48,6 +48,11 @@ def _repeated(record: EpisodeRecord) -> list[float]:
     return found
 
 
+def _false_end(record: EpisodeRecord) -> list[float]:
+    """-1 for ending an episode whose task is not done."""
+    return [-float(step.verb == verbs.END and not record.success) for step in steps_of(record)]
+
+
 def _thoughtless(record: EpisodeRecord) -> list[float]:
     """-1 for a decision without a thought before it."""
     return [-float(not step.thought.strip()) for step in steps_of(record)]
@@ -67,6 +72,7 @@ REWARDS: Registry[TurnReward] = Registry(
         "illegal": _illegal,
         "unreadable": _unreadable,
         "repeated": _repeated,
+        "false_end": _false_end,
         "thoughtless": _thoughtless,
         "turns": _turns,
     },

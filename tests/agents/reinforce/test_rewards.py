@@ -43,6 +43,7 @@ RECORD = EpisodeRecord(
         ("illegal", [0, 0, 0, -1, 0, 0]),
         ("unreadable", [0, 0, 0, 0, -1, 0]),
         ("repeated", [0, 0, 0, -1, 0, 0]),
+        ("false_end", [0] * 6),
         ("thoughtless", [0, 0, 0, -1, 0, 0]),
         ("turns", [-0.1] * 6),
     ],
@@ -50,6 +51,13 @@ RECORD = EpisodeRecord(
 def test_each_reward_is_earned_by_its_turns(name: str, earned: list[float]) -> None:
     assert rewards_of(RECORD, {name: 1.0})[name] == pytest.approx(earned)
     assert rewards_of(RECORD, {name: 0.5})[name] == pytest.approx([each / 2 for each in earned])
+
+
+def test_ending_is_false_where_the_task_is_not_done() -> None:
+    failed = RECORD.model_copy(update={"success": False})
+    assert rewards_of(failed, {"false_end": 1.0})["false_end"] == [0, 0, 0, 0, 0, -1]
+    cut = failed.model_copy(update={"steps": failed.steps[:-2]})  # the steps ran out
+    assert rewards_of(cut, {"false_end": 1.0})["false_end"] == [0] * 5
 
 
 def test_a_reward_must_be_known() -> None:
