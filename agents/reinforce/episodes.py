@@ -39,11 +39,18 @@ class Episode:
         turns: the replies, one for each step of the agent.
         values: what was earned on average from before each turn on, where the episode was continued
             from there (:mod:`agents.reinforce.branches`); None elsewhere.
+        start: before which turn of another episode it began, from 0; 0 for the beginning.
     """
 
     record: EpisodeRecord
     turns: tuple[Turn, ...]
     values: tuple[float | None, ...] = ()
+    start: int = 0
+
+    @property
+    def group(self) -> tuple[str, int]:
+        """Names the episodes with which it is compared: those of its task with its start."""
+        return self.record.task_id, self.start
 
     @property
     def steps(self) -> list[StepRecord]:

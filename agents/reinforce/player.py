@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -97,6 +98,8 @@ class Job:
         seed: of the episode.
         agent: the conversation that it goes on with, and ``snapshot`` the environment; None for an
             episode from the beginning.
+        start: the turn, from 0, before which they were taken.
+        turns: how many it goes on at most; None for as many as the episode has left.
     """
 
     task: Task
@@ -105,6 +108,8 @@ class Job:
     seed: int
     agent: VLMAgent | None = None
     snapshot: bytes | None = None
+    start: int = 0
+    turns: int | None = None
 
 
 class _Played:
@@ -172,9 +177,9 @@ class Sampler:
             return players[task.id]
 
         def dress(env: RemoteEnv, task: Task) -> Playable:
-            snapshot = by_key[task.id].snapshot
-            if snapshot is not None:
-                return _TakenUp(env, task, snapshot)
+            job = by_key[task.id]
+            if job.snapshot is not None:
+                return _TakenUp(env, task, job.snapshot, job.turns)
             return _Saved(env, players[task.id]) if forks else env
 
         play_in_pool(
@@ -199,7 +204,8 @@ class Sampler:
             record = record.model_copy(update={"task_id": job.task.id, "sample": job.sample})
             turns = players[job.key].turns()
             if len(turns) == len(steps_of(record)):
-                found.append((job, Episode(record, turns), players[job.key]))
+                made = Episode(record, turns, start=job.start)
+                found.append((job, made, players[job.key]))
         if errors and not found:
             raise RuntimeError(f"all {len(errors)} episodes crashed; the first: {errors[0]}")
         return found
@@ -236,15 +242,20 @@ class _Saved(_Dressed):
 
 
 class _TakenUp(_Dressed):
-    """Begins where a snapshot was taken."""
+    """Begins where a snapshot was taken, and is over after some turns."""
 
-    def __init__(self, env: RemoteEnv, task: Task, snapshot: bytes) -> None:
+    def __init__(self, env: RemoteEnv, task: Task, snapshot: bytes, turns: int | None) -> None:
         super().__init__(env)
         self._task, self._snapshot = task, snapshot
-        self.step: Callable[[Any], Any] = env.step
+        self._left = sys.maxsize if turns is None else turns
 
     def reset(self, **arguments: Any) -> tuple[dict[str, Any], dict[str, Any]]:
         return self._env.restore(self._task, self._snapshot)
+
+    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        self._left -= 1
+        obs, reward, terminated, truncated, info = self._env.step(action)
+        return obs, reward, terminated, truncated or self._left <= 0, info
 
 
 def group_jobs(tasks: Sequence[Task], group: int, seed: Callable[[str], int]) -> list[Job]:

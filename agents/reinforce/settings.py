@@ -26,6 +26,8 @@ class PlaySettings(StrictSettings):
         group: how often each of them is played: the episodes that are compared with each other.
         starts: where these episodes begin. At the ``beginning``; or each task is played once, and
             they go on from there right after a ``refusal``, where the model met one.
+        places: from how many refusals of an episode groups go on, at most; each is a group.
+        turns: how many turns they go on at most; None for as many as the episode has left.
         temperature: at which replies are drawn. Ratios are of the model at this temperature.
         max_tokens: the most tokens of a reply; None for what the model was tuned for.
         concurrency: the most conversations at once in a process.
@@ -36,6 +38,8 @@ class PlaySettings(StrictSettings):
     tasks: Positive = 16
     group: Positive = 8
     starts: Literal["beginning", "refusal"] = "beginning"
+    places: Positive = 1
+    turns: Positive | None = None
     temperature: float = Field(1.0, gt=0, le=10)
     max_tokens: Positive | None = None
     concurrency: Positive = 64

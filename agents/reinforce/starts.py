@@ -8,11 +8,12 @@ from random import Random
 
 from agents.reinforce.episodes import Episode, steps_of
 from agents.reinforce.player import Job, Sampler, group_jobs
+from agents.reinforce.settings import PlaySettings
 from er_gym.tasks.task import Task
 
 
 def after_refusals(
-    sampler: Sampler, tasks: Sequence[Task], group: int, seed: Callable[[str], int]
+    sampler: Sampler, tasks: Sequence[Task], how: PlaySettings, seed: Callable[[str], int]
 ) -> tuple[list[Episode], list[Job]]:
     """Play each task once, and go back to where an action was refused.
 
@@ -23,7 +24,7 @@ def after_refusals(
     Args:
         sampler: plays.
         tasks: what is played.
-        group: how often an episode is continued.
+        how: how often episodes go on from a place, from how many places, and how far.
         seed: gives that of an episode's key.
 
     Returns:
@@ -34,21 +35,21 @@ def after_refusals(
     for job, episode, player in sampler.play(group_jobs(tasks, 1, seed), forks=True):
         whole.append(episode)
         places = turns_after_refusals(episode)
-        if not places:
-            continue
-        turn = Random(job.seed).choice(places)
-        for number in range(1, group + 1):
-            key = f"{job.key}/{turn}/{number}"
-            jobs.append(
-                replace(
-                    job,
-                    key=key,
-                    sample=number,
-                    seed=seed(key),
-                    agent=player.forks[turn],
-                    snapshot=player.snapshots[turn],
+        for turn in Random(job.seed).sample(places, min(how.places, len(places))):
+            for number in range(1, how.group + 1):
+                key = f"{job.key}/{turn}/{number}"
+                jobs.append(
+                    replace(
+                        job,
+                        key=key,
+                        sample=number,
+                        seed=seed(key),
+                        agent=player.forks[turn],
+                        snapshot=player.snapshots[turn],
+                        start=turn,
+                        turns=how.turns,
+                    )
                 )
-            )
     return whole, jobs
 
 

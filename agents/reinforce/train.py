@@ -95,8 +95,6 @@ from er_gym.rollout.run_directory import Manifest
 from er_gym.tasks.suites import Suite
 from er_gym.tasks.task import Task
 
-CONTINUED = "continued"
-"""What the log calls episodes that went on from a state of another."""
 _CPU_LENGTHS = 32  # lengths of batches are multiples, as in fine-tuning
 
 
@@ -324,11 +322,11 @@ def _reinforce(
         def seed(key: str, update: int = update) -> int:
             return _seed(training.seed, update, key)
 
-        mine, group = tasks[process::processes], settings.play.group
+        mine = tasks[process::processes]
         whole, jobs = (
-            after_refusals(samplers["play"], mine, group, seed)
+            after_refusals(samplers["play"], mine, settings.play, seed)
             if settings.play.starts == "refusal"
-            else (None, group_jobs(mine, group, seed))
+            else (None, group_jobs(mine, settings.play.group, seed))
         )
         played = samplers["play"].play(jobs, forks=row.values)
         episodes, continued = [episode for _, episode, _ in played], 0
@@ -368,7 +366,7 @@ def _reinforce(
         line = {
             "update": update,
             **_of_episodes(lines),
-            **{f"{CONTINUED}/{name}": value for name, value in _of_episodes(on).items() if on},
+            **{f"continued/{name}": value for name, value in _of_episodes(on).items() if on},
             "groups_skipped": fmean(skipped) if skipped else 1.0,
             **figures,
             **{f"success/{name}": value for name, value in sorted(state.success.items())},
@@ -386,7 +384,7 @@ def _reinforce(
             validation = line["validation/success"]
             state, best = _with_best(state, best, validation, settings, network)
         if first:
-            append_lines(run.path / EPISODES, [*lines, *(each | {CONTINUED: True} for each in on)])
+            append_lines(run.path / EPISODES, [*lines, *on])
             append_lines(run.path / METRICS, [line])
             for name, value in line.items():
                 board.add_scalar(name, value, update)
@@ -448,9 +446,9 @@ def _rows(
     left out."""
     row = ADVANTAGES.get(settings.advantage.row)
     objective = settings.objective
-    groups: dict[str, list[Episode]] = defaultdict(list)
+    groups: dict[tuple[str, int], list[Episode]] = defaultdict(list)
     for episode in episodes:
-        groups[episode.record.task_id].append(episode)
+        groups[episode.group].append(episode)
     rows: list[Row] = []
     lines: list[dict[str, Any]] = []
     skipped: list[float] = []
@@ -486,10 +484,11 @@ def _line(episode: Episode, rewards: dict[str, list[float]], update: int) -> dic
     return {
         "update": update,
         "task": record.task_id,
+        "start": episode.start,
         "sample": record.sample,
         "type": record.task_type,
         "success": record.success,
-        "ended": record.end_reason,
+        "ended": record.end_reason or "cut short",  # by play.turns
         "turns": len(episode.turns),
         "tokens": sum(len(turn.said) for turn in episode.turns),
         "rewards": {name: round(sum(each), 6) for name, each in rewards.items()},

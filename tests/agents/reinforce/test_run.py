@@ -115,7 +115,13 @@ def test_after_a_kill_it_goes_on_as_if_nothing_had_been(
         },
         {
             "objective": {"kl": 0.1},
-            "play": {"starts": "refusal", "group": 3, "concurrency": 4},
+            "play": {
+                "starts": "refusal",
+                "places": 2,
+                "turns": 1,
+                "group": 3,
+                "concurrency": 4,
+            },
             "training": {"steps": 2},
         },
     ],
@@ -130,12 +136,15 @@ def test_each_way_of_learning_runs(
     assert line["gradient_norm"] > 0
     after = made.play.starts == "refusal"
     assert (line["continued"] > 0) == (after or made.advantage.row == "branches")
-    logged = [bool(each.get("continued")) for each in lines_of(result.path / EPISODES)]
-    assert (logged.count(False), logged.count(True)) == (
-        (1, 3) if after else (made.play.group, 0)
-    )  # from the beginning, and from there on
+    logged = lines_of(result.path / EPISODES)
+    on = [each for each in logged if each["start"]]
+    assert len(logged) - len(on) == line["episodes"] == result.episodes
+    assert line["episodes"] == (1 if after else made.play.group)
+    assert len({each["start"] for each in on}) == (2 if after else 0)
+    assert len(on) == 6 * after
+    assert all(each["turns"] == 1 for each in on)
+    assert any(each["ended"] == "cut short" for each in on) == after
     assert ("continued/reward" in line) == after
-    assert line["episodes"] == result.episodes == logged.count(False)
     assert (result.path / "model").is_dir()
     assert len(result.validation) == (2 if "validation" in more else 0)
 

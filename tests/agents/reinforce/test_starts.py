@@ -11,6 +11,7 @@ import pytest
 
 from agents.reinforce.episodes import Episode, Turn
 from agents.reinforce.player import Job
+from agents.reinforce.settings import PlaySettings
 from agents.reinforce.starts import after_refusals, turns_after_refusals
 from er_gym.rollout.records import EpisodeRecord, StepRecord
 
@@ -61,19 +62,26 @@ def test_a_group_goes_on_from_one_state() -> None:
             for job in jobs
         ]
 
-    tasks: Any = [cast(Any, SimpleNamespace(id=name)) for name in played]
-    sampler: Any = SimpleNamespace(play=play)
-    drawn: set[str] = set()
-    for number in range(20):
-
-        def seed(key: str, number: int = number) -> int:
-            return crc32(f"{number}/{key}".encode())
-
-        whole, jobs = after_refusals(sampler, tasks, 3, seed)
+    def groups(places: int, number: int) -> list[int]:
+        """The turns before which groups begin."""
+        tasks: Any = [cast(Any, SimpleNamespace(id=name)) for name in played]
+        sampler: Any = SimpleNamespace(play=play)
+        how = PlaySettings(group=3, starts="refusal", places=places, turns=5)
+        whole, jobs = after_refusals(
+            sampler, tasks, how, lambda key: crc32(f"{number}/{key}".encode())
+        )
         assert [len(each.turns) for each in whole] == [4, 2]
-        assert [(job.task.id, job.sample) for job in jobs] == [("a", 1), ("a", 2), ("a", 3)]
-        assert len({job.key for job in jobs}) == len({job.seed for job in jobs}) == 3
-        [(agent, snapshot)] = {(str(job.agent), job.snapshot) for job in jobs}
-        assert agent.encode() == snapshot
-        drawn.add(agent)
-    assert drawn == {"a1", "a3"}
+        assert len({job.key for job in jobs}) == len({job.seed for job in jobs}) == len(jobs)
+        starts = [job.start for job in jobs[::3]]
+        for at, start in enumerate(starts):
+            group = jobs[3 * at : 3 * at + 3]
+            assert [(job.task.id, job.sample, job.start, job.turns) for job in group] == [
+                ("a", sample, start, 5) for sample in (1, 2, 3)
+            ]
+            [(agent, snapshot)] = {(str(job.agent), job.snapshot) for job in group}
+            assert agent == f"a{start}"
+            assert snapshot == agent.encode()
+        return starts
+
+    assert {each for number in range(20) for each in groups(1, number)} == {1, 3}
+    assert sorted(groups(2, 0)) == sorted(groups(9, 0)) == [1, 3]
