@@ -9,6 +9,7 @@ from random import Random
 from agents.reinforce.episodes import Episode, steps_of
 from agents.reinforce.player import Job, Sampler, group_jobs
 from agents.reinforce.settings import PlaySettings
+from er_gym.rollout.records import EpisodeRecord
 from er_gym.tasks.task import Task
 
 
@@ -34,7 +35,7 @@ def after_refusals(
     whole, jobs = [], []
     for job, episode, player in sampler.play(group_jobs(tasks, 1, seed), forks=True):
         whole.append(episode)
-        places = turns_after_refusals(episode)
+        places = turns_after_refusals(episode.record)
         for turn in Random(job.seed).sample(places, min(how.places, len(places))):
             for number in range(1, how.group + 1):
                 key = f"{job.key}/{turn}/{number}"
@@ -53,7 +54,14 @@ def after_refusals(
     return whole, jobs
 
 
-def turns_after_refusals(episode: Episode) -> list[int]:
+def turns_after_refusals(record: EpisodeRecord) -> list[int]:
     """The turns, from 0, before which an action was not possible."""
-    steps = steps_of(episode.record)
+    steps = steps_of(record)
     return [turn for turn in range(1, len(steps)) if not steps[turn - 1].success]
+
+
+def insists(record: EpisodeRecord) -> list[bool]:
+    """For each turn after a refusal, whether it names the same type again, as who opens one drawer
+    after another although the last was open already; without a type, the same verb."""
+    named = [step.object_type or step.verb for step in steps_of(record)]
+    return [named[turn] == named[turn - 1] for turn in turns_after_refusals(record)]

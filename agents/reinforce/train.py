@@ -83,7 +83,7 @@ from agents.reinforce.run_files import (
     rewind,
 )
 from agents.reinforce.settings import ReinforceSettings
-from agents.reinforce.starts import after_refusals
+from agents.reinforce.starts import after_refusals, insists
 from agents.vlm.clients.checkpoint import checkpoint_in_memory
 from agents.vlm.clients.local import LocalClient
 from agents.vlm.matching import Matcher
@@ -517,15 +517,19 @@ def _of_episodes(lines: Sequence[dict[str, Any]]) -> dict[str, float]:
 
 
 def _validated(sampler: Sampler, tasks: Sequence[Task]) -> dict[str, float]:
-    """Success by the likeliest tokens, and why episodes ended, of all processes."""
+    """Success by the likeliest tokens, why episodes ended, and how often the model insisted on
+    what was refused, of all processes."""
     jobs = group_jobs(tasks, 1, lambda key: _seed(0, 0, key))
     records = [episode.record for _, episode, _ in sampler.play(jobs)]
     _forget(sampler)
-    found = gather_object([(each.success, each.end_reason) for each in records])
-    ended = Counter(reason for _, reason in found)
+    found = gather_object([(each.success, each.end_reason, insists(each)) for each in records])
+    ended = Counter(reason for _, reason, _ in found)
+    insisted = [each for _, _, of_episode in found for each in of_episode]
     return {
-        "validation/success": fmean(done for done, _ in found),
+        "validation/success": fmean(done for done, _, _ in found),
         **{f"validation/ended/{name}": n / len(found) for name, n in sorted(ended.items())},
+        "validation/refused": len(insisted) / len(found),
+        "validation/insists": fmean(insisted) if insisted else 0.0,
     }
 
 

@@ -12,7 +12,7 @@ import pytest
 from agents.reinforce.episodes import Episode, Turn
 from agents.reinforce.player import Job
 from agents.reinforce.settings import PlaySettings
-from agents.reinforce.starts import after_refusals, turns_after_refusals
+from agents.reinforce.starts import after_refusals, insists, turns_after_refusals
 from er_gym.rollout.records import EpisodeRecord, StepRecord
 
 
@@ -41,8 +41,18 @@ def episode(*legal: bool, appended: bool = False) -> Episode:
     ],
 )
 def test_the_turns_after_a_refusal(legal: tuple[bool, ...], turns: list[int]) -> None:
-    assert turns_after_refusals(episode(*legal)) == turns
-    assert turns_after_refusals(episode(*legal, appended=True)) == turns
+    assert turns_after_refusals(episode(*legal).record) == turns
+    assert turns_after_refusals(episode(*legal, appended=True).record) == turns
+
+
+def test_it_insists_where_it_names_the_same_type_again() -> None:
+    told = [("open", "Drawer", True), ("open", "Drawer", False), ("navigate to", "Drawer", True)]
+    told += [("pickup", "Cup", False), ("move forward", "", False), ("rotate left", "", True)]
+    steps = [StepRecord(verb=verb, object_type=name, success=ok) for verb, name, ok in told]
+    record = episode().record
+    record = record.model_copy(update={"steps": [*record.steps, *steps]})
+    assert turns_after_refusals(record) == [2, 4, 5]
+    assert insists(record) == [True, False, False]
 
 
 def test_a_group_goes_on_from_one_state() -> None:
