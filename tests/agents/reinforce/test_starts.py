@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 from zlib import crc32
@@ -53,6 +54,12 @@ def test_it_insists_where_it_names_the_same_type_again() -> None:
     record = record.model_copy(update={"steps": [*record.steps, *steps]})
     assert turns_after_refusals(record) == [2, 4, 5]
     assert insists(record) == [True, False, False]
+
+
+def test_only_episodes_from_the_same_state_are_compared() -> None:
+    one = episode(True)
+    assert one.group == replace(one).group
+    assert one.group != replace(one, start=2).group
 
 
 def test_a_group_goes_on_from_one_state() -> None:
