@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from agents.configs import ConfigKind, StrictSettings
 from agents.finetune.settings import Fraction, ModelSettings, Positive, Rate
@@ -45,6 +45,15 @@ class PlaySettings(StrictSettings):
     concurrency: Positive = 64
     workers: Positive = 1
     env: Mapping[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _goes_on(self) -> PlaySettings:
+        if self.starts == "beginning" and (self.places, self.turns) != (1, None):
+            raise ValueError(
+                "places and turns say how episodes go on from a refusal; set starts=refusal, or "
+                "leave them out"
+            )
+        return self
 
 
 class CurriculumSettings(StrictSettings):

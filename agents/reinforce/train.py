@@ -176,6 +176,11 @@ def reinforce(
             f"advantage.row={settings.advantage.row} compares the episodes of a task, and "
             "play.group is 1; set play.group=8"
         )
+    if row.values and settings.play.starts == "refusal":
+        raise ValueError(
+            f"advantage.row={settings.advantage.row} continues episodes from their states itself, "
+            "so it does not go with play.starts=refusal; set play.starts=beginning"
+        )
     check_suite(suite, settings)
     suite = replace(suite, tasks=tasks_of_types(suite, settings))
     validation_tasks(settings)  # played later, but what is wrong with them is said now

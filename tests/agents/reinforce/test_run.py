@@ -171,10 +171,14 @@ def test_what_does_not_go_together_is_refused(model: Path, suite: Suite, tmp_pat
         assert not (tmp_path / "run").exists()
 
     refused("play.group=8", settings(play={"group": 1}))
+    twice = settings(play={"starts": "refusal"}, advantage={"row": "branches"})
+    refused("branches .* play.starts=beginning", twice)
     refused("kept for evaluation", settings(), load_suite("mini"))
     validated = settings(validation={"suite": "er-val", "tasks": 1})
     same = [t for t in load_suite("er-val").tasks if t.arrangement.layout][:1]
     refused("1 arrangements .* also in er-val", validated, replace(suite, tasks=tuple(same)))
     refused("unknown|no advantage", settings(advantage={"row": "best"}))
+    with pytest.raises(ValueError, match="set starts=refusal"):
+        settings(play={"turns": 2})
     with pytest.raises(ValueError, match=r"lora\.dropout"):
         settings(model={"lora": {"dropout": 0.1}})
