@@ -16,7 +16,7 @@ from er_gym.tasks.task import Task
 def after_refusals(
     sampler: Sampler, tasks: Sequence[Task], how: PlaySettings, seed: Callable[[str], int]
 ) -> tuple[list[Episode], list[Job]]:
-    """Play each task once, and go back to where an action was refused.
+    """Play each task once, and go back to where an action was refused, or none was named.
 
     A model that says the refused action again, almost for sure, seldom shows itself another way:
     few of its episodes from the beginning tell what that would bring. So a whole group goes on from
@@ -55,7 +55,8 @@ def after_refusals(
 
 
 def turns_after_refusals(record: EpisodeRecord) -> list[int]:
-    """The turns, from 0, before which an action was not possible."""
+    """The turns, from 0, before which a reply was of no use: its action was not possible, or it
+    named none."""
     steps = steps_of(record)
     return [turn for turn in range(1, len(steps)) if not steps[turn - 1].success]
 
