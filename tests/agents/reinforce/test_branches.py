@@ -6,23 +6,18 @@ from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
+from played import played
+
 from agents.reinforce.branches import with_values
-from agents.reinforce.episodes import Episode, Turn
+from agents.reinforce.episodes import Episode
 from agents.reinforce.player import Job
 from agents.reinforce.settings import ReinforceSettings
-from er_gym.rollout.records import EpisodeRecord, StepRecord
+from er_gym.rollout.records import StepRecord
 
 
 def episode(*rewards: float) -> Episode:
     """One whose turns do these shares of its key actions."""
-    steps = [StepRecord(verb="init", success=True)]
-    steps += [StepRecord(verb="observe", success=True, reward=each) for each in rewards]
-    record = EpisodeRecord(
-        task_id="t", task_type="single_search", scene="FloorPlan1", instruction="?", name="?",
-        key_actions=[], max_steps=10, agent="a", seed=0, success=False, end_reason="end",
-        total_reward=0.0, seconds=0.0, steps=steps,
-    )  # fmt: skip
-    return Episode(record, tuple(Turn([1], [2], [], "x") for _ in rewards))
+    return played([StepRecord(verb="observe", success=True, reward=each) for each in rewards])
 
 
 def test_episodes_are_continued_from_every_state_that_is_asked_for() -> None:
@@ -44,9 +39,9 @@ def test_episodes_are_continued_from_every_state_that_is_asked_for() -> None:
     })  # fmt: skip
     player = SimpleNamespace(forks=["a0", "a1", "a2"], snapshots=[b"0", b"1", b"2"])
     task = cast(Any, SimpleNamespace(id="t"))
-    played: Any = [(Job(task, "t", 1, 7), episode(0, 0, 0), player)]
+    done: Any = [(Job(task, "t", 1, 7), episode(0, 0, 0), player)]
     sampler: Any = SimpleNamespace(play=play)
-    (found,), continued = with_values(sampler, played, settings, lambda key: len(key))
+    (found,), continued = with_values(sampler, done, settings, lambda key: len(key))
     assert found.values == (1.5, None, 1.0)  # the means of 0 + 1 and 1 + 1, and of 0 + 1
     assert [(job.agent, job.snapshot) for job in asked] == [("a0", b"0")] * 2 + [("a2", b"2")] * 2
     assert len({job.key for job in asked}) == continued == 4

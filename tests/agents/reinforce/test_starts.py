@@ -9,26 +9,18 @@ from typing import Any, cast
 from zlib import crc32
 
 import pytest
+from played import played
 
-from agents.reinforce.episodes import Episode, Turn
+from agents.reinforce.episodes import Episode
 from agents.reinforce.player import Job
 from agents.reinforce.settings import PlaySettings
 from agents.reinforce.starts import after_refusals, insists, turns_after_refusals
-from er_gym.rollout.records import EpisodeRecord, StepRecord
+from er_gym.rollout.records import StepRecord
 
 
 def episode(*legal: bool, appended: bool = False) -> Episode:
     """One in which these actions were possible."""
-    steps = [StepRecord(verb="init", success=True)]
-    steps += [StepRecord(verb="open", success=each) for each in legal]
-    if appended:
-        steps.append(StepRecord(verb="end", success=True, appended=True))
-    record = EpisodeRecord(
-        task_id="t", task_type="single_search", scene="FloorPlan1", instruction="?", name="?",
-        key_actions=[], max_steps=10, agent="a", seed=0, success=False, end_reason="end",
-        total_reward=0.0, seconds=0.0, steps=steps,
-    )  # fmt: skip
-    return Episode(record, tuple(Turn([1], [2], [], "x") for _ in legal))
+    return played([StepRecord(verb="open", success=each) for each in legal], appended=appended)
 
 
 @pytest.mark.parametrize(
@@ -50,8 +42,7 @@ def test_it_insists_where_it_names_the_same_type_again() -> None:
     told = [("open", "Drawer", True), ("open", "Drawer", False), ("navigate to", "Drawer", True)]
     told += [("pickup", "Cup", False), ("move forward", "", False), ("rotate left", "", True)]
     steps = [StepRecord(verb=verb, object_type=name, success=ok) for verb, name, ok in told]
-    record = episode().record
-    record = record.model_copy(update={"steps": [*record.steps, *steps]})
+    record = played(steps).record
     assert turns_after_refusals(record) == [2, 4, 5]
     assert insists(record) == [True, False, False]
 
@@ -63,14 +54,14 @@ def test_only_episodes_from_the_same_state_are_compared() -> None:
 
 
 def test_a_group_goes_on_from_one_state() -> None:
-    played = {"a": (False, True, False, True), "b": (True, True)}
+    legal = {"a": (False, True, False, True), "b": (True, True)}
 
     def play(jobs: Sequence[Job], *, forks: bool) -> list[tuple[Job, Episode, Any]]:
         assert forks
         return [
             (
                 job,
-                episode(*played[job.task.id]),
+                episode(*legal[job.task.id]),
                 SimpleNamespace(
                     forks=[f"{job.task.id}{turn}" for turn in range(4)],
                     snapshots=[f"{job.task.id}{turn}".encode() for turn in range(4)],
@@ -81,7 +72,7 @@ def test_a_group_goes_on_from_one_state() -> None:
 
     def groups(places: int, number: int) -> list[int]:
         """The turns before which groups begin."""
-        tasks: Any = [cast(Any, SimpleNamespace(id=name)) for name in played]
+        tasks: Any = [cast(Any, SimpleNamespace(id=name)) for name in legal]
         sampler: Any = SimpleNamespace(play=play)
         how = PlaySettings(group=3, starts="refusal", places=places, turns=5)
         whole, jobs = after_refusals(
