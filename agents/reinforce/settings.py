@@ -25,7 +25,8 @@ class PlaySettings(StrictSettings):
         tasks: how many tasks of the suite are played before each update, by all processes together.
         group: how often each of them is played: the episodes that are compared with each other.
         starts: where these episodes begin. At the ``beginning``; or each task is played once, and
-            they go on from there right after a ``refusal``, where the model met one.
+            they go on from there right after a ``refusal``: an action that was not possible, or a
+            reply that named none.
         places: from how many refusals of an episode groups go on, at most; each is a group.
         turns: how many turns they go on at most; None for as many as the episode has left.
         temperature: at which replies are drawn. Ratios are of the model at this temperature.

@@ -69,6 +69,7 @@ from agents.reinforce.checks import (
 from agents.reinforce.curriculum import chosen_tasks, with_results
 from agents.reinforce.episodes import Episode, scored
 from agents.reinforce.learner import Learner
+from agents.reinforce.log_lines import line_of, lines_of, means_of
 from agents.reinforce.player import ANCHOR, Sampler, group_jobs
 from agents.reinforce.playing_copy import PlayingCopy
 from agents.reinforce.rewards import REWARDS, rewards_of
@@ -347,12 +348,12 @@ def _reinforce(
         playing.refresh()
 
         # what all processes have seen
-        lines, on = gather_object(lines), list[dict[str, Any]]()
-        if whole is not None:  # what was learnt from are only the ends of episodes
-            on, lines = lines, gather_object(_lines(whole, settings, update))
-            continued += len(episodes)
+        from_beginning, on = (
+            (lines, []) if whole is None else (lines_of(whole, settings, update), lines)
+        )
+        lines, on = gather_object(from_beginning), gather_object(on)
         skipped = gather_object(skipped)
-        continued = sum(gather_object([continued]))
+        continued = sum(gather_object([continued])) + len(on)
         seconds = time.monotonic() - began
         state = state.model_copy(
             update={
@@ -370,8 +371,8 @@ def _reinforce(
         )
         line = {
             "update": update,
-            **_of_episodes(lines),
-            **{f"continued/{name}": value for name, value in _of_episodes(on).items() if on},
+            **means_of(lines),
+            **{f"continued/{name}": value for name, value in means_of(on).items() if on},
             "groups_skipped": fmean(skipped) if skipped else 1.0,
             **figures,
             **{f"success/{name}": value for name, value in sorted(state.success.items())},
@@ -459,7 +460,7 @@ def _rows(
     skipped: list[float] = []
     for members in groups.values():
         earned = [rewards_of(each.record, settings.rewards) for each in members]
-        lines += [_line(e, rewards, update) for e, rewards in zip(members, earned, strict=True)]
+        lines += [line_of(e, rewards, update) for e, rewards in zip(members, earned, strict=True)]
         group = [scored(e, rewards) for e, rewards in zip(members, earned, strict=True)]
         within = objective.skip_within
         skipped.append(float(row.compares and within is not None and spread(group) <= within))
@@ -475,47 +476,6 @@ def _rows(
                 keep_all=bool(objective.entropy or objective.kl),
             )
     return rows, lines, skipped
-
-
-def _lines(
-    episodes: Sequence[Episode], settings: ReinforceSettings, update: int
-) -> list[dict[str, Any]]:
-    """A line for the log of each."""
-    return [_line(e, rewards_of(e.record, settings.rewards), update) for e in episodes]
-
-
-def _line(episode: Episode, rewards: dict[str, list[float]], update: int) -> dict[str, Any]:
-    record = episode.record
-    return {
-        "update": update,
-        "task": record.task_id,
-        "start": episode.start,
-        "sample": record.sample,
-        "type": record.task_type,
-        "success": record.success,
-        "ended": record.end_reason or "cut short",  # by play.turns
-        "turns": len(episode.turns),
-        "tokens": sum(len(turn.said) for turn in episode.turns),
-        "rewards": {name: round(sum(each), 6) for name, each in rewards.items()},
-    }
-
-
-def _of_episodes(lines: Sequence[dict[str, Any]]) -> dict[str, float]:
-    """Means over the episodes of an update."""
-    if not lines:
-        return {"success": 0.0, "reward": 0.0}
-    ended = Counter(each["ended"] for each in lines)
-    return {
-        "success": fmean(each["success"] for each in lines),
-        "reward": fmean(sum(each["rewards"].values()) for each in lines),
-        **{
-            f"reward/{name}": fmean(each["rewards"][name] for each in lines)
-            for name in lines[0]["rewards"]
-        },
-        **{f"ended/{name}": count / len(lines) for name, count in sorted(ended.items())},
-        "turns": fmean(each["turns"] for each in lines),
-        "tokens_said": fmean(each["tokens"] for each in lines),
-    }
 
 
 # -- validation and the result ---------------------------------------------------------------------

@@ -147,7 +147,8 @@ def test_each_way_of_learning_runs(
     assert ("continued/reward" in line) == after
     assert (result.path / "model").is_dir()
     assert len(result.validation) == (2 if "validation" in more else 0)
-    assert line.get("validation/refused", 2) > 1  # it says nothing that the environment knows
+    if "validation" in more:
+        assert line["validation/refused"] > 1  # it says nothing that the environment knows
 
 
 def test_the_command_says_what_cannot_learn(tmp_path: Path) -> None:
