@@ -22,6 +22,10 @@ def source_of(
     Args:
         name, tasks_file: what names the suite.
         played: the run whose tasks they are; None for no run.
+
+    Raises:
+        BadInput: the tasks of the run are not found, or the suite has others.
+        ValueError: there is no such suite, or the file holds none.
     """
     from er_gym.rollout.run_directory import RunDirectory
 
@@ -29,7 +33,15 @@ def source_of(
         suite = suite_given(name, tasks_file)
         return suite, {"backend": "embedded", **suite.env}
     manifest = RunDirectory.open(played).manifest
-    suite = suite_given(name if name or tasks_file else manifest.suite, tasks_file)
+    try:
+        suite = suite_given(name if name or tasks_file else manifest.suite, tasks_file)
+    except ValueError as error:
+        if name or tasks_file:
+            raise
+        raise BadInput(
+            f"{played} was played with the tasks of {manifest.suite}, which are not found by that "
+            f"name ({error}); give the --tasks-file or --suite of that run"
+        ) from None
     if suite.digest != manifest.suite_digest:
         raise BadInput(
             f"{played} was played with other tasks than those of {suite.name}; give the --suite "

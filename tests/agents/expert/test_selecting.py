@@ -398,6 +398,9 @@ def test_bad_input_is_told_in_a_line(run: Path, collected: Path, tmp_path: Path)
     assert "other tasks than those of mini" in select(
         "--select", other("suite", suite_digest="0" * 64)
     )
+    assert "with the tasks of mine, which are not found by that name" in select(
+        "--select", other("of-a-file", suite="mine")
+    )
     unity = other("unity", env={"backend": "unity"})
     assert "does not repeat itself exactly" in select("--select", unity)
     assert "was played with backend 'unity'" in select("--select", run, "--select", unity)
