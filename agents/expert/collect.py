@@ -14,7 +14,7 @@ from agents.expert.candidates import (
     CandidateSequence,
     FixedCandidates,
 )
-from agents.expert.corrections import CorrectAfter, CorrectBy, correction_points
+from agents.expert.corrections import SEVERAL, CorrectAfter, CorrectBy, correction_points
 from agents.expert.explorer import Strength
 from agents.expert.players import Players, PlaySettings
 from agents.expert.prescreen import prescreen
@@ -190,6 +190,7 @@ def correction_strata(
     limit: int | None,
     after: CorrectAfter = "wrong",
     by: CorrectBy = "expert",
+    max_steps: int | None = None,
 ) -> tuple[dict[tuple[str, str], Stratum], dict[str, int]]:
     """The failed episodes of a run, as candidates to be corrected.
 
@@ -199,6 +200,7 @@ def correction_strata(
         limit: how many trajectories in all; None for as many as there are.
         after: the action after which another agent takes over.
         by: the agent that takes over.
+        max_steps: the step limit of the corrections; None for that of the episodes.
 
     Returns:
         The candidates, all in the part :data:`CORRECTIONS`; and how many episodes cannot be
@@ -210,7 +212,7 @@ def correction_strata(
     begun: set[tuple[str, tuple[Action, ...]]] = set()
     for episode in run_directory.episodes():
         task = by_id.get(episode.task_id)
-        for beginning in correction_points(episode, after):
+        for beginning in correction_points(episode, after, max_steps):
             problem = beginning.problem if task else "its task is not among the suite's"
             if not problem and (episode.task_id, beginning.actions) in begun:
                 problem = "another sample of its task begins alike"
@@ -218,7 +220,7 @@ def correction_strata(
             if task is None or problem:
                 left_out[problem] = left_out.get(problem, 0) + 1
                 continue
-            where = f"-{len(beginning.actions)}" if after == "anywhere" else ""
+            where = f"-{len(beginning.actions)}" if after in SEVERAL else ""
             candidates.append(
                 Candidate(
                     id=f"{episode.key}-{CORRECTED}{where}",
@@ -239,10 +241,16 @@ def correction_strata(
     return {(CORRECTIONS, ""): Stratum(FixedCandidates(candidates), quota)}, left_out
 
 
-def corrections_recipe() -> Recipe:
-    """The recipe of a collection that corrects a run: one part, whatever the task types."""
+def corrections_recipe(max_steps: int | None = None) -> Recipe:
+    """The recipe of a collection that corrects a run: one part, whatever the task types.
+
+    Args:
+        max_steps: the step limit of the corrections, if it is not that of the tasks.
+    """
     types = dict.fromkeys(BY_NAME, 1)
     part = Part(actor="corrector", types=types, explorers={"run": Strength()})
+    if max_steps is not None:
+        part = part.model_copy(update={"most_actions": max(part.most_actions, max_steps)})
     return Recipe(parts={CORRECTIONS: part})
 
 

@@ -12,7 +12,7 @@ from er_gym.envs.info import REPEATED
 from er_gym.rollout.records import ERROR, EpisodeRecord, StepRecord
 from er_gym.tasks import verbs
 
-CorrectAfter: TypeAlias = Literal["wrong", "failure", "anywhere"]
+CorrectAfter: TypeAlias = Literal["wrong", "failure", "anywhere", "refusal"]
 """After which action of a failed episode the expert takes over: the first ``wrong`` one, which did
 no key action, as in the paper (arXiv 2503.21696); or the first ``failure`` since the last key
 action, which the environment refused. Where the same action a fourth time ended the episode and
@@ -20,14 +20,17 @@ nothing was refused before, it is the third time. Where there is none, or it lea
 :data:`ROOM` steps, it is the first wrong one after all. Or ``anywhere``: :data:`DRAWS` actions: the
 third time, where a fourth ended the episode; then others drawn at random, first among the refused
 ones. Each begins its own correction, so that the states of the failed agent are learnt from, as in
-DAgger (Ross et al. 2011, arXiv 1011.0686)."""
+DAgger (Ross et al. 2011, arXiv 1011.0686). Or ``refusal``: as ``anywhere``, but after refused
+actions only, for an agent that goes on as if nothing had been refused."""
+SEVERAL: frozenset[CorrectAfter] = frozenset(("anywhere", "refusal"))
+"""Those that begin several corrections of an episode."""
 CorrectBy: TypeAlias = Literal["expert", "searcher"]
 """Who takes over: the ``expert``, which knows where things are; or the ``searcher``, which knows
 the instruction and what the failed episode has seen (:mod:`agents.expert.takeover`)."""
 ROOM = 10
 """Steps that the expert needs after a failure."""
 DRAWS = 6
-"""Corrections of one episode, at most, where the expert takes over anywhere."""
+"""Corrections of one episode, at most, where it is corrected at several actions."""
 
 
 @dataclass(frozen=True)
@@ -48,17 +51,33 @@ class Beginning:
         return len(self.actions) - 1
 
 
-def correction_points(episode: EpisodeRecord, after: CorrectAfter = "wrong") -> list[Beginning]:
-    """The beginnings of a failed episode that are corrected; one that has a ``problem`` if none."""
-    if after != "anywhere" or episode.success or episode.error:
-        return [first_mistake(episode, "wrong" if after == "anywhere" else after)]
+def correction_points(
+    episode: EpisodeRecord, after: CorrectAfter = "wrong", max_steps: int | None = None
+) -> list[Beginning]:
+    """The beginnings of a failed episode that are corrected; one that has a ``problem`` if none.
+
+    Args:
+        episode: what failed.
+        after: after which actions another agent takes over.
+        max_steps: the step limit of the corrections; None for that of the episode.
+    """
+    limit = max_steps or episode.max_steps
+    if after == "wrong" or after == "failure":
+        return [first_mistake(episode, after, limit)]
+    if episode.success or episode.error:
+        return [first_mistake(episode)]
     steps = episode.steps[1:]
     end = len(steps) - 1 if episode.end_reason == REPEATED else len(steps)
-    end = min(end, episode.max_steps - ROOM - 1)  # placing the agent was a step, too
+    end = min(end, limit - ROOM - 1)  # placing the agent was a step, too
     readable = next((n for n, one in enumerate(steps) if one.verb in (ERROR, verbs.END)), end)
-    places = range(min(readable, end))
+    places = [
+        place
+        for place in range(min(readable, end))
+        if after == "anywhere" or not steps[place].success
+    ]
     if not places:
-        return [Beginning(problem="no action leaves room for a correction")]
+        which = "action" if after == "anywhere" else "refused action"
+        return [Beginning(problem=f"no {which} leaves room for a correction")]
     third = len(steps) - 2 if episode.end_reason == REPEATED else None
     drawn = Random(episode.key).sample(places, len(places))
     drawn.sort(key=lambda place: (place != third, steps[place].success))  # else as drawn
@@ -66,15 +85,20 @@ def correction_points(episode: EpisodeRecord, after: CorrectAfter = "wrong") -> 
 
 
 def first_mistake(
-    episode: EpisodeRecord, after: Literal["wrong", "failure"] = "wrong"
+    episode: EpisodeRecord,
+    after: Literal["wrong", "failure"] = "wrong",
+    max_steps: int | None = None,
 ) -> Beginning:
-    """The actions of a failed episode up to the one that is corrected."""
+    """The actions of a failed episode up to the one that is corrected.
+
+    The arguments are those of :func:`correction_points`.
+    """
     if episode.success:
         return Beginning(problem="the episode succeeded")
     if episode.error:
         return Beginning(problem="the episode crashed")
     steps = episode.steps[1:]
-    wrong = _corrected(episode, after)
+    wrong = _corrected(episode, after, max_steps or episode.max_steps)
     if wrong is None:
         return Beginning(problem="nothing was wrong before the steps ran out")
     last = steps[wrong]
@@ -90,13 +114,13 @@ def _until(steps: Sequence[StepRecord], last: int) -> Beginning:
     return Beginning(tuple(Action(step.verb, step.object_type) for step in steps[: last + 1]))
 
 
-def _corrected(episode: EpisodeRecord, after: CorrectAfter) -> int | None:
+def _corrected(episode: EpisodeRecord, after: CorrectAfter, max_steps: int) -> int | None:
     """The index of the action that is corrected, from 0; None if every one did a key action."""
     steps = episode.steps[1:]
     did = [step.reward > 0 for step in steps]
     if after == "failure":
         last_key = max((number for number, earned in enumerate(did) if earned), default=-1)
-        end = min(len(steps), episode.max_steps - ROOM - 1)  # placing the agent was a step, too
+        end = min(len(steps), max_steps - ROOM - 1)  # placing the agent was a step, too
         for number in range(last_key + 1, end):
             if not steps[number].success and steps[number].verb not in (ERROR, verbs.END):
                 if episode.end_reason != REPEATED or number < len(steps) - 1:

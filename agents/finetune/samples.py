@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from agents.finetune.settings import DataSettings
+from agents.finetune.word_noise import with_word_noise
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import MANIFEST, Collection
 from er_gym.data.dialects import load_dialect
@@ -145,7 +146,9 @@ def _opened(path: Path, settings: DataSettings) -> _Source:
 def _of_collection(collection: Collection, settings: DataSettings) -> _Source:
     dialect = load_dialect(settings.dialect)
     trajectories = [
-        each for each in collection.trajectories() if settings.takes(each.part, each.kind)
+        with_word_noise(each, settings.word_noise)
+        for each in collection.trajectories()
+        if settings.takes(each.part, each.kind)
     ]
     try:
         chats = tuple(dialect.chat(each, settings.language) for each in trajectories)

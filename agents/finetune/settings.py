@@ -73,6 +73,9 @@ class DataSettings(StrictSettings):
             all; so does the paper's released code. ``all``: as ``turns``, and the text of the
             system's and user's messages, without pictures; a model from random weights learns
             faster so.
+        word_noise: each word of an English instruction is replaced by one that does not exist, with
+            this probability; the names of object types stay. A model with random weights learns to
+            read instructions in words that are new to it.
         max_length: the most tokens of a conversation. A longer one is an error: to cut it would cut
             pictures.
         min_pixels, max_pixels: a picture with fewer or more is scaled.
@@ -84,6 +87,7 @@ class DataSettings(StrictSettings):
     dialect: str = "paper"
     language: Language | None = None
     mask: Mask = "turns"
+    word_noise: Fraction = 0.0
     max_length: Positive = 32_768
     min_pixels: Positive = 3_136
     max_pixels: Positive = 180_000

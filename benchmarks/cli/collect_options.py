@@ -86,16 +86,21 @@ class CollectOptions(OptionGroup):
         help="Correct the failed episodes of a run of er-gym bench; give no --recipe.",
     )
     correct_after: CorrectAfter | None = option(
-        type=click.Choice(("wrong", "failure", "anywhere")),
+        type=click.Choice(("wrong", "failure", "anywhere", "refusal")),
         help="With --correct: where the expert takes over. wrong: after the first action that did "
         "no key action; failure: after the first that failed since the last key action; anywhere: "
-        "after up to six actions drawn at random, refused ones first.  "
-        "[default: wrong, as in the paper]",
+        "after up to six actions drawn at random, refused ones first; refusal: after refused ones "
+        "only.  [default: wrong, as in the paper]",
     )
     correct_by: CorrectBy | None = option(
         type=click.Choice(("expert", "searcher")),
         help="With --correct: which agent takes over. The searcher knows only what the failed "
         "agent knew.  [default: expert]",
+    )
+    correct_steps: int | None = option(
+        type=click.IntRange(min=1),
+        help="With --correct: the step limit. A correction that begins late needs more steps than "
+        "the episode had.  [default: the task type's own]",
     )
     allow_empty: bool = option(
         is_flag=True,
@@ -128,7 +133,10 @@ def refuse_misfits(
         if expert_options.decides and options.kinds is not None:
             raise BadInput("--kinds is for --decisions plan: a model that decides plays one kind")
     if options.correct is None:
-        refuse(("--correct-after", "--correct-by"), "is for --correct RUN; leave it out")
+        refuse(
+            ("--correct-after", "--correct-by", "--correct-steps"),
+            "is for --correct RUN; leave it out",
+        )
     else:
         why = "is for a recipe; --correct RUN collects without one"
         refuse(("--recipe", "--parts", "--kinds"), why)

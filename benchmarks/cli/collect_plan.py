@@ -53,12 +53,14 @@ def settings_of(
 
     if model is not None:
         env = {**env, **model.env}
+    if options.correct_steps is not None:
+        env = {**env, "max_steps": options.correct_steps}
     EmbodiedEnv((), **env)  # so that bad arguments are found before any worker starts
     kinds = load_thought_kinds(options.thoughts)
     pictures = None
     if not options.no_pictures:
         pictures = Pictures(quality=80, min_pixels=1, max_pixels=2**24)
-    stated = corrections_recipe() if recipe is None else recipe
+    stated = corrections_recipe(options.correct_steps) if recipe is None else recipe
     if model is not None and model.options.decides:
         from agents.expert.decider import model_recipe
 
@@ -112,7 +114,9 @@ def candidates(
         return wanted, {}
     after, by = options.correct_after or "wrong", options.correct_by or "expert"
     run = RunDirectory.open(correct)
-    strata, left_out = correction_strata(settings.tasks, run, options.limit, after, by)
+    strata, left_out = correction_strata(
+        settings.tasks, run, options.limit, after, by, options.correct_steps
+    )
     if not (strata or options.allow_empty):
         why = "; ".join(f"{number} x {reason}" for reason, number in left_out.items())
         raise BadInput(f"{correct} has no episode that can be corrected ({why or 'it is empty'})")

@@ -223,7 +223,22 @@ def test_failed_episodes_of_a_run_are_corrected(tmp_path: Path, er_gym: ErGym) -
     code, _, told = er_gym("collect", "--correct", run, "--out", out, "--correct-after", "failure")
     assert code == 2
     assert "correct_after" in told  # the collection has others
-    for option, value in (("--correct-after", "failure"), ("--correct-by", "searcher")):
+    late = tmp_path / "late"
+    after = ("--correct-after", "refusal", "--correct-steps", 60)
+    told = collect(late, "--correct", run, *after, "--limit", 3, "--workers", 1)
+    corrected = trajectories(late)
+    assert corrected, told
+    for each in corrected:
+        assert each.max_steps == 60
+        assert each.correction is not None
+        assert not each.turns[each.correction.first_wrong].success
+    code, shown, told = er_gym("data", "verify", late, "--suite", NAME)
+    assert code == 0, (shown, told)
+    for option, value in (
+        ("--correct-after", "failure"),
+        ("--correct-by", "searcher"),
+        ("--correct-steps", 60),
+    ):
         code, _, told = er_gym("collect", "--suite", NAME, "--out", out, option, value)
         assert code == 2
         assert f"{option} is for --correct RUN" in told

@@ -10,6 +10,7 @@ from pathlib import Path
 import er_gym
 from agents.finetune.samples import drawn
 from agents.finetune.settings import DataSettings, Mask
+from agents.finetune.word_noise import with_word_noise
 from er_gym.data.chat import Chat
 from er_gym.data.collection import MANIFEST, Collection, CollectionManifest
 from er_gym.data.dialects import Dialect, load_dialect
@@ -186,7 +187,7 @@ def released(chat: Chat) -> Chat:
 def _of_collection(collection: Collection, settings: DataSettings) -> Iterator[Chat]:
     dialect = load_dialect(settings.dialect)
     taken = (
-        each
+        with_word_noise(each, settings.word_noise)
         for each in collection.trajectories()
         if each.turns and settings.takes(each.part, each.kind)
     )

@@ -157,6 +157,35 @@ def test_somebody_can_take_over_anywhere() -> None:
         assert none.actions == ()
 
 
+def test_episodes_are_corrected_after_refusals() -> None:
+    """After each refused action that leaves enough steps, up to a number; nowhere else."""
+    go, refused = "navigate to Bed", "!pickup Egg"
+    for steps, most, reason, wanted in (
+        ([go, refused, go, refused, go], 30, "", {2, 4}),
+        ([go, refused, go, refused, go], 14, "", {2}),
+        ([go, *[refused] * 4], 30, "repeated action", {2, 3, 4}),
+        ([refused, "!error", refused], 30, "", {1}),
+    ):
+        begun = correction_points(failed(*steps, max_steps=most, end_reason=reason), "refusal")
+        assert {len(each.actions) for each in begun} == wanted, steps
+        assert not any(each.problem for each in begun)
+    late = failed(*[go] * 12, refused, go, max_steps=14)
+    assert correction_points(late, "refusal")[0].problem
+    assert [len(each.actions) for each in correction_points(late, "refusal", 30)] == [13]
+    assert correction_points(late, "failure", 30)[0].first_wrong == 12
+    many = correction_points(failed(*[go, refused] * 9, max_steps=40), "refusal")
+    assert len(many) == DRAWS
+    assert all(len(each.actions) % 2 == 0 for each in many)
+    for episode, problem in (
+        (failed(go, go, max_steps=30), "no refused action leaves room"),
+        (failed(go, refused, max_steps=10), "no refused action leaves room"),
+        (failed(go, refused, error="boom"), "the episode crashed"),
+    ):
+        (none,) = correction_points(episode, "refusal")
+        assert problem in none.problem
+        assert none.actions == ()
+
+
 def test_some_episodes_cannot_be_corrected() -> None:
     won = failed(*KEYS, earned=3).model_copy(update={"success": True})
     garbled = failed("navigate to Sink", "error", "pickup Egg", earned=1)

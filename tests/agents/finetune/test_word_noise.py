@@ -1,0 +1,55 @@
+"""Made-up words in instructions: what is replaced, what stays, and where it ends up."""
+
+from __future__ import annotations
+
+import re
+
+from agents.finetune.launchers.sources import open_source
+from agents.finetune.samples import open_samples
+from agents.finetune.settings import DataSettings
+from agents.finetune.word_noise import with_word_noise
+from er_gym.data.collection import Collection
+from er_gym.tasks.wordings.names import types_by_name
+
+
+def test_some_words_are_made_up_and_names_stay(played: Collection) -> None:
+    (like, *_) = played.trajectories()
+    told = "First put the frying pan on the DiningTable, then take a CD to the bank card."
+    names = {word for name in types_by_name() for word in name.split()}
+    changed = total = 0
+    for number in range(200):
+        one = like.model_copy(update={"id": f"t{number}", "instruction": told})
+        noisy = with_word_noise(one, 0.25)
+        assert noisy == with_word_noise(one, 0.25)
+        assert noisy.model_copy(update={"instruction": told}) == one
+        assert re.sub(r"\w+", "", noisy.instruction) == re.sub(r"\w+", "", told)
+        for before, now in zip(told.split(), noisy.instruction.split(), strict=True):
+            word = before.strip(",.").lower()
+            if word in names or len(word) == 1:
+                assert now == before
+            else:
+                total += 1
+                changed += now != before
+                assert now[0].isupper() == before[0].isupper()
+    assert 0.22 < changed / total < 0.28
+    assert with_word_noise(like, 0) is like
+    whole = with_word_noise(like.model_copy(update={"instruction": "take the Mug"}), 1)
+    assert re.fullmatch(r"[a-z]+ [a-z]+ Mug", whole.instruction)
+    assert not {"take", "the"} & {*whole.instruction.split()}
+    chinese = like.model_copy(update={"instruction": "把CD放到床上。"})
+    assert with_word_noise(chinese, 1) == chinese
+
+
+def test_only_the_instruction_of_what_is_learnt_is_noisy(played: Collection) -> None:
+    plain = open_samples([played.path], DataSettings(dialect="text"))
+    settings = DataSettings(dialect="text", word_noise=0.5)
+    noisy = open_samples([played.path], settings)
+    assert noisy.digest != plain.digest
+    instructions = {each.id: each.instruction for each in played.trajectories()}
+    for before, now in zip(plain.chats, noisy.chats, strict=True):
+        changed = [one for one, other in zip(before.turns, now.turns, strict=True) if one != other]
+        assert [turn.role for turn in changed] in ([], ["user"])
+        for turn in changed:
+            assert instructions[before.id] in turn.text
+    told = [chat.turns for chat in open_source(played.path, settings).chats()]
+    assert told == [chat.turns for chat in noisy.chats]
