@@ -230,7 +230,7 @@ random weights, and why their episodes fail. `python -m benchmarks.pages.models`
 directories of `er-gym ladder` and `er-gym ablate` ([ladder.md](ladder.md)). All episodes use
 `instances="explore"`, where the environment does not look at the task to choose which object a type
 name means, and the corrected scorer. Intervals are at 95 %. Each model is the one at the end of its
-training. We chose the training data of the third stages after we had evaluated earlier choices on
+ladder. We chose the training data of the third stages after we had evaluated earlier choices on
 the same tasks ([ladder.md](ladder.md) lists all of them). The policies of reinforcement learning
 are in [baselines.md](baselines.md). [zoo.md](zoo.md) lists the models that come with er-gym.
 

@@ -232,6 +232,7 @@ def test_failed_episodes_of_a_run_are_corrected(tmp_path: Path, er_gym: ErGym) -
         assert each.max_steps == 60
         assert each.correction is not None
         assert not each.turns[each.correction.first_wrong].success
+        assert each.id.endswith(f"-corrected-{each.correction.first_wrong + 1}")  # one of several
     code, shown, told = er_gym("data", "verify", late, "--suite", NAME)
     assert code == 0, (shown, told)
     for option, value in (

@@ -6,6 +6,7 @@ import pytest
 from episodes_by_hand import make_episode, make_key, make_step
 
 from agents.expert.acceptance import PlayedCourse, rejection
+from agents.expert.collect import CORRECTIONS, corrections_recipe
 from agents.expert.corrections import DRAWS, correction_points, first_mistake
 from er_gym.envs.actions import Action
 from er_gym.rollout.records import EpisodeRecord
@@ -173,6 +174,8 @@ def test_episodes_are_corrected_after_refusals() -> None:
     assert correction_points(late, "refusal")[0].problem
     assert [len(each.actions) for each in correction_points(late, "refusal", 30)] == [13]
     assert correction_points(late, "failure", 30)[0].first_wrong == 12
+    for steps, most in ((None, 36), (60, 60), (10, 36)):
+        assert corrections_recipe(steps).parts[CORRECTIONS].most_actions == most
     many = correction_points(failed(*[go, refused] * 9, max_steps=40), "refusal")
     assert len(many) == DRAWS
     assert all(len(each.actions) % 2 == 0 for each in many)
