@@ -13,15 +13,18 @@ from er_gym.rollout.records import ERROR, EpisodeRecord, StepRecord
 from er_gym.tasks import verbs
 
 CorrectAfter: TypeAlias = Literal["wrong", "failure", "anywhere", "refusal"]
-"""After which action of a failed episode the expert takes over: the first ``wrong`` one, which did
-no key action, as in the paper (arXiv 2503.21696); or the first ``failure`` since the last key
-action, which the environment refused. Where the same action a fourth time ended the episode and
-nothing was refused before, it is the third time. Where there is none, or it leaves fewer than
-:data:`ROOM` steps, it is the first wrong one after all. Or ``anywhere``: :data:`DRAWS` actions: the
-third time, where a fourth ended the episode; then others drawn at random, first among the refused
-ones. Each begins its own correction, so that the states of the failed agent are learnt from, as in
-DAgger (Ross et al. 2011, arXiv 1011.0686). Or ``refusal``: as ``anywhere``, but after refused
-actions only, for an agent that goes on as if nothing had been refused."""
+"""After which action of a failed episode another agent takes over:
+
+- ``wrong``: the first that did no key action, as in the paper (arXiv 2503.21696).
+- ``failure``: the first since the last key action that the environment refused. Where the same
+  action a fourth time ended the episode and nothing was refused before, it is the third time. Where
+  there is none, or it leaves fewer than :data:`ROOM` steps, it is the first wrong one after all.
+- ``anywhere``: up to :data:`DRAWS` actions: the third time, where a fourth ended the episode; then
+  others drawn at random, first among the refused ones. Each begins its own correction, so that the
+  states of the failed agent are learnt from, as in DAgger (Ross et al. 2011, arXiv 1011.0686).
+- ``refusal``: as ``anywhere``, but after refused actions only, for an agent that goes on as if
+  nothing had been refused.
+"""
 SEVERAL: frozenset[CorrectAfter] = frozenset(("anywhere", "refusal"))
 """Those that begin several corrections of an episode."""
 CorrectBy: TypeAlias = Literal["expert", "searcher"]

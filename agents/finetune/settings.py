@@ -7,6 +7,7 @@ er-gym's own files are ``configs/finetune/NAME.yaml``. Every field has a default
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, model_validator
@@ -73,9 +74,9 @@ class DataSettings(StrictSettings):
             all; so does the paper's released code. ``all``: as ``turns``, and the text of the
             system's and user's messages, without pictures; a model from random weights learns
             faster so.
-        word_noise: each word of an English instruction is replaced by one that does not exist, with
-            this probability; the names of object types stay. A model with random weights learns to
-            read instructions in words that are new to it.
+        word_noise: with this probability, each word of an English instruction that is in no name of
+            an object type is replaced by random syllables. A model from random weights learns so to
+            read instructions with words that are new to it. Only for collections.
         max_length: the most tokens of a conversation. A longer one is an error: to cut it would cut
             pictures.
         min_pixels, max_pixels: a picture with fewer or more is scaled.
@@ -109,6 +110,18 @@ class DataSettings(StrictSettings):
     def takes(self, part: str, kind: str) -> bool:
         """Whether a trajectory of this part and kind is used."""
         return (not self.parts or part in self.parts) and (not self.kinds or kind in self.kinds)
+
+    def check_word_noise(self, path: Path) -> None:
+        """Refuse word noise where instructions cannot be told from other words.
+
+        Raises:
+            ValueError: it is asked for, and the path is no collection.
+        """
+        if self.word_noise:
+            raise ValueError(
+                f"{path} is no collection of er-gym collect, and data.word_noise={self.word_noise} "
+                "is for those; set data.word_noise=0"
+            )
 
     def check_choice(self, where: str, trajectories: Iterable[Trajectory]) -> None:
         """Refuse a part or a kind that no trajectory has.

@@ -1,4 +1,4 @@
-"""Instructions in which some words are unknown, so that a model learns to read around them."""
+"""Instructions with made-up words, so that a model learns to read around words it does not know."""
 
 from __future__ import annotations
 
@@ -16,14 +16,16 @@ _SYLLABLE = ("bcdfghjklmnprstvwyz", "aeiou", "bdfgklmnprstx")
 def with_word_noise(trajectory: Trajectory, share: float) -> Trajectory:
     """A trajectory in whose English instruction some words are replaced by made-up ones.
 
-    A tiny model knows only the verbs that it was trained with: where a task says "store the Mug in
-    the Fridge", it searches for the Mug and ends. If some words are unknown to it in training, too,
-    it learns to read the rest: two things with "in" between them.
+    A tiny model knows only the words of its training tasks: where a task says "store the Mug in the
+    Fridge", it searches for the Mug and ends. If some words are unknown to it in training, too, it
+    learns to make do with the rest: two things, and what stands between them.
 
     Args:
-        trajectory: the names of object types in its instruction stay, Chinese stays as it is.
-        share: the probability, from 0 to 1, with which each other word is replaced. The same
-            trajectory and share always give the same words.
+        trajectory: what was recorded. In its instruction, each word that occurs in the name of an
+            object type stays ("can", "light"), and so do words of one letter and Chinese.
+        share: the probability, from 0 to 1, with which each other word is replaced by one or two
+            random syllables. The same trajectory and share always give the same words, in each
+            epoch and run.
     """
     if not share:
         return trajectory
@@ -33,8 +35,10 @@ def with_word_noise(trajectory: Trajectory, share: float) -> Trajectory:
         word = match.group()
         if word.lower() in _words_of_names() or rng.random() >= share:
             return word
-        syllables = rng.randint(1, 2)
-        made_up = "".join(rng.choice(letters) for letters in _SYLLABLE * syllables)
+        made_up = word.lower()
+        while made_up == word.lower() or made_up in _words_of_names():
+            syllables = rng.randint(1, 2)
+            made_up = "".join(rng.choice(letters) for letters in _SYLLABLE * syllables)
         return made_up.capitalize() if word[0].isupper() else made_up
 
     return trajectory.model_copy(

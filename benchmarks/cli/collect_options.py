@@ -89,8 +89,8 @@ class CollectOptions(OptionGroup):
         type=click.Choice(("wrong", "failure", "anywhere", "refusal")),
         help="With --correct: where the expert takes over. wrong: after the first action that did "
         "no key action; failure: after the first that failed since the last key action; anywhere: "
-        "after up to six actions drawn at random, refused ones first; refusal: after refused ones "
-        "only.  [default: wrong, as in the paper]",
+        "after up to six actions drawn at random, refused ones first; refusal: after up to six "
+        "refused ones.  [default: wrong, as in the paper]",
     )
     correct_by: CorrectBy | None = option(
         type=click.Choice(("expert", "searcher")),
@@ -99,8 +99,8 @@ class CollectOptions(OptionGroup):
     )
     correct_steps: int | None = option(
         type=click.IntRange(min=1),
-        help="With --correct: the step limit. A correction that begins late needs more steps than "
-        "the episode had.  [default: the task type's own]",
+        help="With --correct: the step limit of corrections, what they repeat included. One that "
+        "begins late needs more steps than the episode had.  [default: the task type's own]",
     )
     allow_empty: bool = option(
         is_flag=True,

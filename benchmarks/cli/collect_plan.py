@@ -114,6 +114,11 @@ def candidates(
         return wanted, {}
     after, by = options.correct_after or "wrong", options.correct_by or "expert"
     run = RunDirectory.open(correct)
+    if after == "refusal" and run.manifest.env.get("faults"):
+        raise BadInput(
+            f"{correct} was played with faults, and what a fault refused succeeds in a correction: "
+            "give a run without --faults, or --correct-after anywhere"
+        )
     strata, left_out = correction_strata(
         settings.tasks, run, options.limit, after, by, options.correct_steps
     )

@@ -235,6 +235,12 @@ def test_failed_episodes_of_a_run_are_corrected(tmp_path: Path, er_gym: ErGym) -
         assert each.id.endswith(f"-corrected-{each.correction.first_wrong + 1}")  # one of several
     code, shown, told = er_gym("data", "verify", late, "--suite", NAME)
     assert code == 0, (shown, told)
+    faulty = tmp_path / "faulty"
+    code, _, told = er_gym(*given, "--faults", 0.1, "--out", faulty)
+    assert code == 0, told
+    code, _, told = er_gym("collect", "--correct", faulty, "--out", tmp_path / "y", *after)
+    assert code == 2
+    assert "was played with faults" in told
     for option, value in (
         ("--correct-after", "failure"),
         ("--correct-by", "searcher"),

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
+
+import pytest
 
 from agents.finetune.launchers.sources import open_source
 from agents.finetune.samples import open_samples
@@ -30,6 +33,7 @@ def test_some_words_are_made_up_and_names_stay(played: Collection) -> None:
             else:
                 total += 1
                 changed += now != before
+                assert now == before or now.strip(",.").lower() not in names
                 assert now[0].isupper() == before[0].isupper()
     assert 0.22 < changed / total < 0.28
     assert with_word_noise(like, 0) is like
@@ -38,6 +42,18 @@ def test_some_words_are_made_up_and_names_stay(played: Collection) -> None:
     assert not {"take", "the"} & {*whole.instruction.split()}
     chinese = like.model_copy(update={"instruction": "把CD放到床上。"})
     assert with_word_noise(chinese, 1) == chinese
+
+
+def test_word_noise_is_for_collections(tmp_path: Path) -> None:
+    """A conversation of a ShareGPT file does not say which of its words are the instruction."""
+    file = tmp_path / "chats.json"
+    file.write_text("[]")
+    settings = DataSettings(word_noise=0.1)
+    for opened in (lambda: open_samples([file], settings), lambda: open_source(file, settings)):
+        with pytest.raises(
+            ValueError, match=r"chats\.json is no collection .* set data.word_noise=0"
+        ):
+            opened()
 
 
 def test_only_the_instruction_of_what_is_learnt_is_noisy(played: Collection) -> None:
