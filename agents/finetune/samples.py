@@ -127,7 +127,7 @@ def drawn(items: Iterable[Item], limit: int | None) -> Iterable[Item]:
 def _opened(path: Path, settings: DataSettings) -> _Source:
     if (path / MANIFEST).is_file():
         return _of_collection(Collection.open(path), settings)
-    settings.check_word_noise(path)
+    settings.refuse_word_noise(path)
     if is_frame_set(path):
         return _of_frames(FrameSet.open(path), settings)
     if not path.exists():

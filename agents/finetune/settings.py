@@ -111,7 +111,7 @@ class DataSettings(StrictSettings):
         """Whether a trajectory of this part and kind is used."""
         return (not self.parts or part in self.parts) and (not self.kinds or kind in self.kinds)
 
-    def check_word_noise(self, path: Path) -> None:
+    def refuse_word_noise(self, path: Path) -> None:
         """Refuse word noise where instructions cannot be told from other words.
 
         Raises:

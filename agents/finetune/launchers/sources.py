@@ -83,7 +83,7 @@ def open_source(path: Path, settings: DataSettings) -> Source:
         collection = Collection.open(path)
         settings.check_choice(str(collection.path), collection.trajectories())
         return Source(path, collection, dialect, lambda: _of_collection(collection, settings))
-    settings.check_word_noise(path)
+    settings.refuse_word_noise(path)
     if path.is_dir() and not (path / "dataset_info.json").is_file():
         raise ValueError(
             f"{path} holds neither a collection ({MANIFEST}) nor dataset_info.json; give what "
