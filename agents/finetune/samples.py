@@ -127,9 +127,9 @@ def drawn(items: Iterable[Item], limit: int | None) -> Iterable[Item]:
 def _opened(path: Path, settings: DataSettings) -> _Source:
     if (path / MANIFEST).is_file():
         return _of_collection(Collection.open(path), settings)
-    settings.refuse_word_noise(path)
-    if is_frame_set(path):
+    if is_frame_set(path):  # it has no instructions, so word noise changes nothing in it
         return _of_frames(FrameSet.open(path), settings)
+    settings.refuse_word_noise(path)
     if not path.exists():
         raise ValueError(
             f"{path} does not exist; give what er-gym collect wrote, or a ShareGPT file"
@@ -179,9 +179,12 @@ def _of_frames(frames: FrameSet, settings: DataSettings) -> _Source:
 
 
 def _check_choice(paths: Sequence[Path], settings: DataSettings) -> None:
-    """Refuse parts and kinds that none of the collections has. A ShareGPT file has neither."""
+    """Refuse parts and kinds that none of the collections has, and word noise without a collection.
+    A ShareGPT file has neither parts nor kinds."""
     collections = [Collection.open(path) for path in paths if (path / MANIFEST).is_file()]
-    if collections:
+    if not collections:
+        settings.refuse_word_noise(paths[0])
+    else:
         names = ", ".join(str(each.path) for each in collections)
         settings.check_choice(names, (one for each in collections for one in each.trajectories()))
 

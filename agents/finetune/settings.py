@@ -76,7 +76,8 @@ class DataSettings(StrictSettings):
             faster so.
         word_noise: with this probability, each word of an English instruction that is in no name of
             an object type is replaced by random syllables. A model from random weights learns so to
-            read instructions with words that are new to it. Only for collections.
+            read instructions with words that are new to it. Only for collections; frames beside
+            them stay as they are.
         max_length: the most tokens of a conversation. A longer one is an error: to cut it would cut
             pictures.
         min_pixels, max_pixels: a picture with fewer or more is scaled.

@@ -9,7 +9,14 @@ import click
 
 from benchmarks.cli.activity import doing
 from benchmarks.cli.errors import INTERRUPTED, BadInput, bad_input, print_problem
-from benchmarks.cli.options import FOLDER, given_size, seed_option, size_option, workers_option
+from benchmarks.cli.options import (
+    EXISTING_FILE,
+    FOLDER,
+    given_size,
+    seed_option,
+    size_option,
+    workers_option,
+)
 from benchmarks.terminal import echo, terminal
 
 if TYPE_CHECKING:
@@ -21,7 +28,8 @@ _QUALITY = 80
 
 
 @click.command()
-@click.option("--suite", required=True, help="The suite whose rooms are visited, such as train.")
+@click.option("--suite", help="The suite whose rooms are visited, such as train.")
+@click.option("--tasks-file", type=EXISTING_FILE, help="Visit the rooms of a file's tasks.")
 @click.option(
     "--frames",
     "number",
@@ -36,7 +44,8 @@ _QUALITY = 80
 @workers_option
 @seed_option
 def frames(
-    suite: str,
+    suite: str | None,
+    tasks_file: Path | None,
     number: int,
     scenes: str | None,
     width: int | None,
@@ -58,7 +67,7 @@ def frames(
     from er_gym.writing import ForeignFile
 
     with bad_input():
-        camera, manifest, rooms = _plan(suite, scenes, width, height, out, seed)
+        camera, manifest, rooms = _plan(suite, tasks_file, scenes, width, height, out, seed)
         todo = visits(rooms, number, seed)
     try:
         with bad_input(Locked, ForeignFile), FrameSet.locked(out, manifest) as frame_set:
@@ -76,19 +85,24 @@ def frames(
 
 
 def _plan(
-    name: str, scenes: str | None, width: int | None, height: int | None, out: Path, seed: int
+    name: str | None,
+    tasks_file: Path | None,
+    scenes: str | None,
+    width: int | None,
+    height: int | None,
+    out: Path,
+    seed: int,
 ) -> tuple[Camera, FramesManifest, list[Any]]:
     """How frames are drawn, the manifest that states it, and the rooms."""
     from benchmarks.cli.options import named
-    from benchmarks.cli.suites import chosen_tasks
+    from benchmarks.cli.suites import chosen_tasks, suite_given
     from er_gym import __version__
     from er_gym.data.frame_camera import Camera, rooms_of
     from er_gym.data.frames import FramesManifest
     from er_gym.envs.embodied_env import EmbodiedEnv
-    from er_gym.tasks.suites import load_suite
 
-    doing(f"reading the suite {name}")
-    suite = chosen_tasks(load_suite(name), (), named("--scenes", scenes))
+    doing(f"reading the suite {name or tasks_file}")
+    suite = chosen_tasks(suite_given(name, tasks_file), (), named("--scenes", scenes))
     env = {
         "backend": "embedded",
         "width": 800,
@@ -100,7 +114,7 @@ def _plan(
         **given_size(width, height),
     }
     if env["backend"] != "embedded":
-        raise BadInput(f"the suite {name} plays on {env['backend']}; frames need the embedded one")
+        raise BadInput(f"the suite {suite.name} plays on {env['backend']}; frames need the embedded one")
     EmbodiedEnv((), **env)  # so that bad arguments are found before any worker starts
     doing("collecting its rooms")
     rooms = rooms_of(suite.tasks)

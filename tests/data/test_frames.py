@@ -26,6 +26,7 @@ from er_gym.data.frames import FRAMES, Frame, FrameSet
 from er_gym.data.pictures import encode_picture
 from er_gym.data.trajectory import PictureRecord, SeenObject
 from er_gym.envs.info import with_details
+from er_gym.tasks.jsonl_format import write_tasks
 from er_gym.tasks.suites import load_suite
 
 SUITE = load_suite("mini")
@@ -81,6 +82,21 @@ def test_another_seed_in_the_same_directory_is_refused(drawn: Path) -> None:
     assert result.exit_code == 2
     assert "its seed is 0, this one's 1" in result.output
     assert files(drawn) == before
+
+
+def test_the_rooms_of_a_file_of_tasks_are_drawn_in_the_same_way(
+    drawn: Path, tmp_path: Path
+) -> None:
+    file, out = tmp_path / "tasks.jsonl", tmp_path / "of-file"
+    write_tasks(file, SUITE.tasks)
+    options = ["--frames", "40", "--out", str(out), "--workers", "1", "--scenes", ROOMS, *SIZE]
+    result = CliRunner().invoke(cli, ["data", "frames", "--tasks-file", str(file), *options])
+    assert result.exit_code == 0, result.output
+    assert files(out) == files(drawn)
+    assert FrameSet.open(out).manifest.suite == "tasks"
+    both = draw(tmp_path / "both", 1, "--tasks-file", str(file))
+    assert both.exit_code == 2
+    assert "give --suite or --tasks-file, not both" in both.output
 
 
 def test_poses_and_states_are_of_many_kinds(drawn: Path) -> None:

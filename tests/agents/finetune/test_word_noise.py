@@ -6,11 +6,13 @@ import re
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from agents.finetune.launchers.sources import open_source
 from agents.finetune.samples import open_samples
 from agents.finetune.settings import DataSettings
 from agents.finetune.word_noise import with_word_noise
+from benchmarks.cli.main import cli
 from er_gym.data.collection import Collection
 from er_gym.tasks.wordings.names import types_by_name
 
@@ -54,6 +56,21 @@ def test_word_noise_is_for_collections(tmp_path: Path) -> None:
             ValueError, match=r"chats\.json is no collection .* set data.word_noise=0"
         ):
             opened()
+
+
+def test_word_noise_leaves_frames_as_they_are(played: Collection, tmp_path: Path) -> None:
+    """They have no instructions; so beside a collection they are welcome, and alone refused."""
+    drawn = tmp_path / "frames"
+    arguments = ["data", "frames", "--suite", "mini", "--scenes", "FloorPlan402", "--frames", "2"]
+    size = ["--width", "96", "--height", "54", "--workers", "1", "--out", str(drawn)]
+    result = CliRunner().invoke(cli, [*arguments, *size])
+    assert result.exit_code == 0, result.output
+    plain, noisy = (DataSettings(dialect="sight", word_noise=share) for share in (0.0, 0.5))
+    with pytest.raises(ValueError, match=r"frames is no collection .* set data.word_noise=0"):
+        open_samples([drawn], noisy)
+    both = open_samples([drawn, played.path], noisy)
+    assert both.chats[:2] == open_samples([drawn], plain).chats
+    assert both.chats[2:] == open_samples([played.path], noisy).chats
 
 
 def test_only_the_instruction_of_what_is_learnt_is_noisy(played: Collection) -> None:
