@@ -114,7 +114,9 @@ def _plan(
         **given_size(width, height),
     }
     if env["backend"] != "embedded":
-        raise BadInput(f"the suite {suite.name} plays on {env['backend']}; frames need the embedded one")
+        raise BadInput(
+            f"the suite {suite.name} plays on {env['backend']}; frames need the embedded one"
+        )
     EmbodiedEnv((), **env)  # so that bad arguments are found before any worker starts
     doing("collecting its rooms")
     rooms = rooms_of(suite.tasks)
