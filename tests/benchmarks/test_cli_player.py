@@ -116,6 +116,7 @@ def lines(out: str) -> dict[str, str]:
         *PROGRAMS,
         "Unity build",
         "GPU",
+        "memory allocator",
     ]
     parts += ["package agents", "package benchmarks", "package cv2"]
     parts += [f"extra {name}" for name in extras()]
@@ -180,6 +181,25 @@ def test_doctor_has_a_line_for_each_part(er_gym, the_client, home):
         assert (f"  {problems}; {plug.install}" if problems else plug.page) in line[
             f"plug {plug.name}"
         ]
+
+
+@pytest.mark.parametrize(
+    ("loaded", "works", "told"),
+    [
+        ("/lib/libc.so.6\n/usr/lib/libtcmalloc_minimal.so.4.5.10", True, "TCMalloc"),
+        ("/lib/libc.so.6", False, "LD_PRELOAD=libtcmalloc_minimal.so.4"),
+    ],
+)
+def test_doctor_says_whether_tcmalloc_is_loaded(monkeypatch, loaded, works, told):
+    monkeypatch.setattr(doctor_checks, "_loaded_libraries", lambda: loaded)
+    (check,) = doctor_checks._memory_allocator()
+    assert check.works == works
+    assert told in f"{check.detail}; {check.fix}"
+
+
+def test_doctor_says_nothing_of_memory_where_it_cannot_tell(monkeypatch):
+    monkeypatch.setattr(doctor_checks, "_loaded_libraries", lambda: "")
+    assert list(doctor_checks._memory_allocator()) == []
 
 
 def test_doctor_tells_the_player_from_unity(er_gym, the_client):
