@@ -137,9 +137,11 @@ class Reenacted:
             "subgoal": known.subgoal,
             "plan": [*known.plan],
         }
-        return told if self._quoted else {**told, "thoughts": self._witness.thoughts}
+        return told if self._quotes(known.turn) else {**told, "thoughts": self._witness.thoughts}
 
-    @property
-    def _quoted(self) -> bool:
-        """Whether the thoughts are those of an agent that decided itself."""
+    def _quotes(self, turn: int) -> bool:
+        """Whether the thoughts of a turn are those of an agent that decided itself."""
+        said = self.header["correction"]
+        if said is not None and said.agent:
+            return bool(turn <= said.first_wrong)
         return self.header["kind"] in QUOTING and not self._witness.writes

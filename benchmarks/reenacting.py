@@ -189,7 +189,8 @@ class Told:
         turns = trajectory.turns
         beginning = None
         if said is not None:
-            beginning = Beginning(tuple(turn.action for turn in turns[: said.first_wrong + 1]))
+            repeated = tuple(turn.action for turn in turns[: said.first_wrong + 1])
+            beginning = Beginning(repeated, agent=said.agent)
         return Candidate(
             id=trajectory.id,
             part=trajectory.part,

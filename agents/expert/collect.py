@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from agents.expert.candidates import (
@@ -14,16 +14,24 @@ from agents.expert.candidates import (
     CandidateSequence,
     FixedCandidates,
 )
-from agents.expert.corrections import SEVERAL, CorrectAfter, CorrectBy, correction_points
+from agents.expert.corrections import (
+    SEVERAL,
+    Beginning,
+    CorrectAfter,
+    CorrectBy,
+    correction_points,
+)
 from agents.expert.explorer import Strength
 from agents.expert.players import Players, PlaySettings
 from agents.expert.prescreen import prescreen
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
+from agents.expert.recorded_replies import recorded_replies
 from er_gym.data.collection import Collection, CollectionError
-from er_gym.data.trajectory import Trajectory
+from er_gym.data.trajectory import Language, Trajectory
 from er_gym.envs.actions import Action
 from er_gym.rollout.events import Cost, EventListener
 from er_gym.rollout.executor import Parallelism
+from er_gym.rollout.records import EpisodeRecord
 from er_gym.rollout.run_directory import Manifest, RunDirectory
 from er_gym.rollout.runner import run
 from er_gym.tasks.task import Task
@@ -191,6 +199,7 @@ def correction_strata(
     after: CorrectAfter = "wrong",
     by: CorrectBy = "expert",
     max_steps: int | None = None,
+    own_thoughts_in: Language | None = None,
 ) -> tuple[dict[tuple[str, str], Stratum], dict[str, int]]:
     """The failed episodes of a run, as candidates to be corrected.
 
@@ -201,6 +210,8 @@ def correction_strata(
         after: the action after which another agent takes over.
         by: the agent that takes over.
         max_steps: the step limit of the corrections; None for that of the episodes.
+        own_thoughts_in: the language of the collection, if what its trajectories repeat is to keep
+            the thoughts of the agent that failed.
 
     Returns:
         The candidates, all in the part :data:`CORRECTIONS`; and how many episodes cannot be
@@ -213,6 +224,8 @@ def correction_strata(
     for episode in run_directory.episodes():
         task = by_id.get(episode.task_id)
         for beginning in correction_points(episode, after, max_steps):
+            if own_thoughts_in and not beginning.problem:
+                beginning = _with_own_thoughts(beginning, run_directory, episode, own_thoughts_in)
             problem = beginning.problem if task else "its task is not among the suite's"
             if not problem and (episode.task_id, beginning.actions) in begun:
                 problem = "another sample of its task begins alike"
@@ -239,6 +252,20 @@ def correction_strata(
         return {}, left_out
     quota = len(candidates) if limit is None else min(limit, len(candidates))
     return {(CORRECTIONS, ""): Stratum(FixedCandidates(candidates), quota)}, left_out
+
+
+def _with_own_thoughts(
+    beginning: Beginning, run: RunDirectory, episode: EpisodeRecord, language: Language
+) -> Beginning:
+    """The beginning of a failed episode with what its agent thought; it has a ``problem`` if that
+    is not recorded, or in another language."""
+    words = recorded_replies(run.path, episode)
+    if words is None or words.silent:
+        return Beginning(problem="its agent left no thoughts")
+    if words.language != language:
+        return Beginning(problem=f"its agent thought in {words.language}, not in {language}")
+    said = tuple(turn.thoughts for turn in words.turns[: len(beginning.actions)])
+    return replace(beginning, agent=run.manifest.agent, said=said)
 
 
 def corrections_recipe(max_steps: int | None = None) -> Recipe:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import Literal, TypeAlias
 
+from er_gym.data.trajectory import ThoughtKind
 from er_gym.envs.actions import Action
 from er_gym.envs.info import REPEATED
 from er_gym.rollout.records import ERROR, EpisodeRecord, StepRecord
@@ -43,10 +44,14 @@ class Beginning:
     Attributes:
         actions: up to the one after which the expert takes over, that one included.
         problem: why there is none, ``""`` if there is.
+        agent: who failed, where its thoughts are kept.
+        said: then, for each action, kind and text of the thoughts before it.
     """
 
     actions: tuple[Action, ...] = ()
     problem: str = ""
+    agent: str = ""
+    said: tuple[tuple[tuple[ThoughtKind, str], ...], ...] = ()
 
     @property
     def first_wrong(self) -> int:

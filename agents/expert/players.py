@@ -110,6 +110,7 @@ class Thinkers:
             rejects=partial(self.rejection, most_actions=most_actions),
             places=places,
             think_later=self.think_later,
+            beginning=candidate.beginning,
         )
 
     def rejection(self, trajectory: Trajectory, most_actions: int) -> str:
@@ -129,6 +130,7 @@ def header_of(candidate: Candidate, settings: PlaySettings) -> TrajectoryHeader:
             run=candidate.run,
             episode=candidate.episode,
             first_wrong=candidate.beginning.first_wrong,
+            agent=candidate.beginning.agent,
         )
     return TrajectoryHeader(
         task_id=candidate.task.id,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import Any
 
+from agents.expert.corrections import Beginning
 from agents.expert.course import Course, Intent, View
 from agents.expert.places import DrawnPlaces, PlaceChooser
 from agents.expert.recorder import (
@@ -43,6 +44,7 @@ class ThinkingAgent:
         places: chooses the course's wrong places; what that costs is the trajectory's too.
         think_later: whether thoughts are written when the episode is over, and only if the
             trajectory will be taken: for writers that cost something. The thoughts are the same.
+        beginning: what the course repeats first; its agent's own thoughts are kept, if it has them.
     """
 
     obs_mode = OBS_MODE
@@ -59,8 +61,10 @@ class ThinkingAgent:
         rejects: Callable[[Trajectory], str] = lambda trajectory: "",
         places: PlaceChooser = DrawnPlaces(),  # noqa: B008 (has no state)
         think_later: bool = False,
+        beginning: Beginning | None = None,
     ) -> None:
         self._think_later = think_later
+        self._beginning = beginning or Beginning()
         self._course, self._header, self._rejects = course, header, rejects
         self._kinds, self._writer, self._pictures = kinds, writer, pictures
         self._random, self._places = Random(seed), places
@@ -70,7 +74,7 @@ class ThinkingAgent:
         """Begin an episode."""
         self._recorder = TrajectoryRecorder(task, self._header, self._pictures, self._rejects)
         self._intents: Iterator[Intent] | None = None
-        self._thoughtless: list[_Thoughtless] = []
+        self._thoughtless: dict[int, _Thoughtless] = {}
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """Decide, think, and act.
@@ -90,10 +94,16 @@ class ThinkingAgent:
         replies = self._places.take_replies()
         recorder.pay(replies)
         this = _Thoughtless(kinds, recorder.pictures_now, self._random.getrandbits(48))
+        now = len(recorder.turns) - 1
+        if now < len(self._beginning.said):
+            own = recorder.think_own(
+                now, self._beginning.said[now], self._beginning.agent, self._kinds.limits["alone"]
+            )
+            return Decision(intent.action, thoughts_text(own), total_reply(replies))
         if self._think_later:
-            self._thoughtless.append(this)
+            self._thoughtless[now] = this
             return Decision(intent.action, reply=total_reply(replies))
-        written = self._think(recorder, len(recorder.turns) - 1, this)
+        written = self._think(recorder, now, this)
         return Decision(
             intent.action,
             thoughts_text(written.thoughts),
@@ -110,7 +120,7 @@ class ThinkingAgent:
         if recorder is None:
             return {}
         if self._thoughtless and recorder.will_be_taken(episode):
-            for index, each in enumerate(self._thoughtless):
+            for index, each in self._thoughtless.items():
                 self._think(recorder, index, each)
         return recorder.attachments(episode, stem)
 

@@ -102,6 +102,12 @@ class CollectOptions(OptionGroup):
         help="With --correct: the step limit of corrections, what they repeat included. One that "
         "begins late needs more steps than the episode had.  [default: the task type's own]",
     )
+    own_thoughts: bool = option(
+        is_flag=True,
+        help="With --correct: what a correction repeats keeps the thoughts of the agent that "
+        "failed, so that a model learns to go on from what it wrongly believed. Else --writer "
+        "writes them anew, too.",
+    )
     allow_empty: bool = option(
         is_flag=True,
         help="With --select or --correct: exit with 0 even if no episode can be taken.",
@@ -134,7 +140,7 @@ def refuse_misfits(
             raise BadInput("--kinds is for --decisions plan: a model that decides plays one kind")
     if options.correct is None:
         refuse(
-            ("--correct-after", "--correct-by", "--correct-steps"),
+            ("--correct-after", "--correct-by", "--correct-steps", "--own-thoughts"),
             "is for --correct RUN; leave it out",
         )
     else:

@@ -26,10 +26,15 @@ def _name_of(run: Path) -> str:
     return f"{run.resolve().name} ({RunDirectory.open(run).manifest.digest})"
 
 
-def _stated_corrections(options: CollectOptions) -> dict[str, str]:
+def _stated_corrections(options: CollectOptions) -> dict[str, Any]:
     """How it is corrected, for the manifest, which does not state the paper's way."""
-    stated = {"correct_after": options.correct_after, "correct_by": options.correct_by}
-    return {name: given for name, given in stated.items() if given not in (None, "wrong", "expert")}
+    stated = {
+        "correct_after": options.correct_after,
+        "correct_by": options.correct_by,
+        "own_thoughts": options.own_thoughts,
+    }
+    usual = (None, "wrong", "expert", False)
+    return {name: given for name, given in stated.items() if given not in usual}
 
 
 def settings_of(
@@ -120,7 +125,13 @@ def candidates(
             "give a run without --faults, or --correct-after anywhere"
         )
     strata, left_out = correction_strata(
-        settings.tasks, run, options.limit, after, by, options.correct_steps
+        settings.tasks,
+        run,
+        options.limit,
+        after,
+        by,
+        options.correct_steps,
+        options.language if options.own_thoughts else None,
     )
     if not (strata or options.allow_empty):
         why = "; ".join(f"{number} x {reason}" for reason, number in left_out.items())

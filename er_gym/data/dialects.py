@@ -435,7 +435,7 @@ def _seen(
 ) -> str:
     """What the assistant says first of what it is shown, in a dialect in which it tells that."""
     shown = bool(trajectory.turns[index].pictures)
-    if texts.scene_by == "user" or not shown or _thinks_itself(trajectory):
+    if texts.scene_by == "user" or not shown or _thinks_itself(trajectory, index):
         return ""
     return told_scene(texts, now, before, last)
 
@@ -445,7 +445,8 @@ def _reply(texts: DialectTexts, trajectory: Trajectory, index: int, seen: str) -
     turn = trajectory.turns[index]
     decision = f"<DecisionMaking>{turn.action}</DecisionMaking>"
     thoughts = [(each.kind, without_markup(each.text).strip()) for each in turn.thoughts]
-    if texts.thoughts == "notes" and texts.notes is not None and not _thinks_itself(trajectory):
+    noted = texts.thoughts == "notes" and not _thinks_itself(trajectory, index)
+    if noted and texts.notes is not None:
         thoughts = [note(texts.notes, trajectory, index)]
     if seen:
         thoughts.insert(0, (SEEN, seen))
@@ -461,11 +462,13 @@ def _reply(texts: DialectTexts, trajectory: Trajectory, index: int, seen: str) -
     return texts.sentence_separator.join(said) + "\n" + decision
 
 
-def _thinks_itself(trajectory: Trajectory) -> bool:
-    """Whether the thoughts are those of a model that decided the actions, too."""
-    return any(
-        each.writer == trajectory.actor for turn in trajectory.turns for each in turn.thoughts
-    )
+def _thinks_itself(trajectory: Trajectory, index: int) -> bool:
+    """Whether the thoughts of a turn are those of the model that decided it, too: of the one that
+    decided all, or, where a correction begins, of the one that failed."""
+    said = trajectory.correction
+    if said is not None and said.agent:
+        return index <= said.first_wrong
+    return any(each.writer == trajectory.actor for one in trajectory.turns for each in one.thoughts)
 
 
 def _drawn(sentences: Sequence[str], key: str) -> str:

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 from er_gym.data.collection import CollectionManifest
 from er_gym.data.comparing import compared
-from er_gym.data.train_rule import QUOTING
+from er_gym.data.train_rule import QUOTING, own_voice
 from er_gym.data.trajectory import Cost, Trajectory
 from er_gym.rollout.play import episode_seed
 from er_gym.rollout.records import EpisodeRecord, record_episode
@@ -146,6 +146,11 @@ def _correction(origin: Origin, trajectory: Trajectory) -> Iterator[str]:
             str(settings["corrects"]).rpartition(" (")[0],
             trajectory.id.rpartition("-corrected")[0],
         )
+    if bool(said.agent) != bool(settings.get("own_thoughts")):
+        yield (
+            f"correction.agent is {said.agent!r:.120}, but by the settings the beginning has "
+            f"{'its own' if settings.get('own_thoughts') else 'no own'} thoughts"
+        )
     yield from compared("correction.run", said.run, run, "the collection's settings")
     yield from compared("correction.episode", said.episode, episode, "the id")
     wrong = next((k for k, turn in enumerate(trajectory.turns) if not turn.earned), -1)
@@ -157,11 +162,10 @@ def _correction(origin: Origin, trajectory: Trajectory) -> Iterator[str]:
 def _writers(origin: Origin, trajectory: Trajectory) -> Iterator[str]:
     """Who may have thought; another package's writer may name itself as it likes."""
     named = str(origin.settings.get("writer", GROUNDED))
-    own = trajectory.actor if trajectory.kind in QUOTING else ""
-    writers = {GROUNDED, origin.model, own} - {""}
     if named != GROUNDED:
         return
     for index, turn in enumerate(trajectory.turns):
+        writers = {GROUNDED, origin.model, own_voice(trajectory, index)} - {""}
         for number, thought in enumerate(turn.thoughts):
             if thought.writer not in writers:
                 yield (

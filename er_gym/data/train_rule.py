@@ -17,6 +17,14 @@ QUOTING = ("model", "played")
 """Kinds of trajectories with a model's own decisions and words."""
 
 
+def own_voice(trajectory: Trajectory, index: int) -> str:
+    """Who decided a turn and thought so itself; ``""`` if its thoughts were written for it."""
+    said = trajectory.correction
+    if trajectory.kind in QUOTING:
+        return trajectory.actor
+    return said.agent if said is not None and index <= said.first_wrong else ""
+
+
 def _after_the_beginning(trajectory: Trajectory, index: int, turn: Turn) -> bool:
     said = trajectory.correction
     return said is None or index > said.first_wrong

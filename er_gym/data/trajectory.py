@@ -221,11 +221,13 @@ class Correction(_Record):
             the task's id, with the number of the sample where it is not the first.
         first_wrong: the index of the turn after which the expert took over; by default the first
             one that left the key actions.
+        agent: who failed, if the turns up to that one have its own thoughts; else ``""``.
     """
 
     run: str
     episode: str
     first_wrong: int
+    agent: str = ""
 
 
 class Trajectory(_Record):

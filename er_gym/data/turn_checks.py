@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TypeAlias
 
 from er_gym.data.comparing import compared
-from er_gym.data.train_rule import QUOTING, learnt
+from er_gym.data.train_rule import QUOTING, learnt, own_voice
 from er_gym.data.trajectory import Purpose, Trajectory, Turn
 from er_gym.rollout.records import ERROR
 from er_gym.tasks import verbs
@@ -77,7 +77,7 @@ def _plan(trajectory: Trajectory, index: int) -> Iterator[str]:
 
 def _thoughts(trajectory: Trajectory, index: int) -> Iterator[str]:
     kinds = [each.kind for each in trajectory.turns[index].thoughts]
-    if trajectory.kind in QUOTING:
+    if own_voice(trajectory, index):
         return
     if not 0 < len(kinds) <= MOST_THOUGHTS or len({*kinds}) < len(kinds):
         yield (

@@ -23,7 +23,7 @@ from er_gym.data.pictures import Encoding
 from er_gym.data.reenactment import NOBODY, Reenact
 from er_gym.data.replay import replay
 from er_gym.data.shown_pictures import Album
-from er_gym.data.train_rule import QUOTING
+from er_gym.data.train_rule import own_voice
 from er_gym.data.trajectory import Trajectory
 from er_gym.data.turn_checks import turn_problems
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -157,8 +157,9 @@ def thought_problems(
 ) -> Iterator[str]:
     """The critic's objections to a trajectory's thoughts, one line each.
 
-    If a model decided and thought in one reply, its thoughts are kept as they are, and the record
-    has the critic's objections. Then it is a problem only if these are others.
+    If a model decided and thought in one reply, or failed where a correction begins, its thoughts
+    are kept as they are, and the record has the critic's objections. Then it is a problem only if
+    these are others.
 
     Args:
         trajectory: the trajectory.
@@ -167,7 +168,6 @@ def thought_problems(
         read: counts the ``sentences``, and those ``unread``, in which the rules read no claim.
     """
     counts: Counter[str] = Counter() if read is None else read
-    quotes = trajectory.kind in QUOTING
     for index, turn in enumerate(trajectory.turns):
         if not turn.thoughts:
             continue
@@ -177,8 +177,9 @@ def thought_problems(
             instruction=trajectory.instruction,
             language=trajectory.language,
         )
+        voice = own_voice(trajectory, index)
         for number, thought in enumerate(turn.thoughts):
-            quoted = quotes and thought.writer == trajectory.actor
+            quoted = bool(voice) and thought.writer == voice
             limit = limits[thought.kind] if quoted and limits else MOST_WORDS
             reviewed = critic.review(thought.text, thought.kind, knowledge, limit=limit)
             found = reviewed.refusals

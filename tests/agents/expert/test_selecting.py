@@ -341,6 +341,69 @@ def test_a_models_thoughts_are_its_own(tmp_path: Path) -> None:
     assert not screen([directory], load_suite("mini").tasks, longest, seed=0).candidates
 
 
+def test_a_correction_may_begin_with_the_words_of_who_failed(tmp_path: Path) -> None:
+    """A model that sees what is not there learns to go on from its own mistake."""
+    pytest.importorskip("openai", reason="needs the extra vlm")
+    from benchmarks.checks.scripted_expert import answers
+    from benchmarks.harness.chat_server import ChatServer, Messages
+
+    task = next(one for one in load_suite("mini").tasks if one.id == TASKS[0])
+
+    def play(messages: Messages) -> str:
+        number = sum(each["role"] == "assistant" for each in messages)
+        words = f"<Observation>There is the Fridge, {number}.</Observation>"
+        return f"{words}<DecisionMaking>navigate to Fridge</DecisionMaking>"
+
+    run, plain, out = (tmp_path / name for name in ("run", "plain", "own"))
+    with ChatServer(answers(play)) as server:
+        done(
+            "bench", "--suite", "mini", "--agent", "openai:scripted", "--base-url", server.url,
+            "--task-ids", task.id, "--concurrency", 1, "--out", run, "--set", "sees=text",
+        )  # fmt: skip
+    how = ("--correct-after", "anywhere", "--correct-by", "searcher", "--workers", 1)
+    done("collect", "--correct", run, *how, "--out", plain)
+    done("collect", "--correct", run, *how, "--own-thoughts", "--out", out)
+    rewritten, own = ({one.id: one for one in trajectories(each)} for each in (plain, out))
+    assert rewritten.keys() == own.keys()
+    assert len(own) > 1
+    for name, each in own.items():
+        assert each.correction is not None
+        after = each.correction.first_wrong + 1
+        assert each.correction.agent == "openai:scripted"
+        assert each.actions == rewritten[name].actions
+        said = [[(one.kind, one.text) for one in turn.thoughts] for turn in each.turns]
+        assert said[:after] == [
+            [("analysis", f"There is the Fridge, {number}.")] for number in range(after)
+        ]
+        writers = [{one.writer for one in turn.thoughts} for turn in each.turns]
+        assert writers == [{"openai:scripted"}] * after + [{"grounded"}] * len(writers[after:])
+        assert not any(turn.train for turn in each.turns[:after])
+        for dialect in ("sight", "text", "paper"):
+            chat = load_dialect(dialect).chat(each)
+            replies = [turn for turn in chat.turns if turn.role == "assistant"]
+            for number, reply in enumerate(replies):
+                assert ("There is the Fridge" in reply.text) == (number < after)
+        for dialect in ("sight", "text"):
+            reply = load_dialect(dialect).chat(rewritten[name]).turns[2]
+            assert "There is the Fridge" not in reply.text
+    assert problems(out, load_suite("mini").tasks) == []
+    file = out / "trajectories.jsonl"
+    kept = file.read_text()
+    for old, new, told in (
+        ("openai:scripted", "", "correction.agent is ''"),
+        ("There is the Fridge, 0", "There is the Mug, 0", "refused"),
+    ):
+        file.write_text(
+            kept.replace(f'"agent":"{old}"', f'"agent":"{new}"').replace(old, new or old)
+        )
+        assert any(told in line for line in problems(out, load_suite("mini").tasks)), told
+
+
+def test_own_thoughts_need_thoughts(run: Path, tmp_path: Path) -> None:
+    told = refusal("collect", "--correct", run, "--own-thoughts", "--out", tmp_path / "x")
+    assert "its agent left no thoughts" in told
+
+
 @pytest.mark.parametrize("language", ["en", "zh"])
 def test_speech_is_split_where_the_dialect_joined_it(collected: Path, language: Any) -> None:
     dialect = load_dialect("paper")
