@@ -386,6 +386,8 @@ def test_a_correction_may_begin_with_the_words_of_who_failed(tmp_path: Path) -> 
         for dialect in ("sight", "text"):
             reply = load_dialect(dialect).chat(rewritten[name]).turns[2]
             assert "There is the Fridge" not in reply.text
+    chinese = ("--own-thoughts", "--language", "zh", "--out", tmp_path / "zh")
+    assert "thought in en, not in zh" in refusal("collect", "--correct", run, *chinese)
     assert problems(out, load_suite("mini").tasks) == []
     file = out / "trajectories.jsonl"
     kept = file.read_text()
