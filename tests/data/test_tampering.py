@@ -122,7 +122,8 @@ HEADERS = {
     "actor": ({"kind": "model", "actor": "gpt"}, "actor is '' by the collection's settings, reco"),
     "correction": (
         {"correction": Correction(run="attempt", episode="x", first_wrong=0)},
-        "correction is Correction(run='attempt', episode='x', first_wrong=0), but the kind is 'b'",
+        "correction is Correction(run='attempt', episode='x', first_wrong=0, agent=''), but the "
+        "kind is 'b'",
     ),
 }
 
