@@ -258,7 +258,7 @@ def _memory_allocator() -> Iterator[Check]:
     if "libtcmalloc" in loaded:
         yield Check(name, True, "TCMalloc")
     elif loaded:
-        detail = "the C library's; models learn faster on a CPU with TCMalloc"
+        detail = "not TCMalloc, with which models learn faster on a CPU"
         fix = (
             "apt install libtcmalloc-minimal4, and LD_PRELOAD=libtcmalloc_minimal.so.4 er-gym "
             "finetune …"
@@ -268,8 +268,10 @@ def _memory_allocator() -> Iterator[Check]:
 
 def _loaded_libraries() -> str:
     """What this process has loaded, as Linux lists it; empty on other systems."""
-    listed = Path("/proc/self/maps")
-    return listed.read_text() if listed.exists() else ""
+    try:
+        return Path("/proc/self/maps").read_text(errors="replace")
+    except OSError:
+        return ""
 
 
 def _extras() -> Iterator[Check]:

@@ -30,6 +30,7 @@ from er_gym.data.scene_text import (
     named_text,
     scene_text,
 )
+from er_gym.data.train_rule import repeats_own_words
 from er_gym.data.trajectory import (
     TAG_OF_KIND,
     THOUGHT_KINDS,
@@ -465,10 +466,9 @@ def _reply(texts: DialectTexts, trajectory: Trajectory, index: int, seen: str) -
 def _thinks_itself(trajectory: Trajectory, index: int) -> bool:
     """Whether the thoughts of a turn are those of the model that decided it, too: of the one that
     decided all, or, where a correction begins, of the one that failed."""
-    said = trajectory.correction
-    if said is not None and said.agent:
-        return index <= said.first_wrong
-    return any(each.writer == trajectory.actor for one in trajectory.turns for each in one.thoughts)
+    return repeats_own_words(trajectory, index) or any(
+        each.writer == trajectory.actor for one in trajectory.turns for each in one.thoughts
+    )
 
 
 def _drawn(sentences: Sequence[str], key: str) -> str:

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 from er_gym.data.collection import CollectionManifest
 from er_gym.data.comparing import compared
-from er_gym.data.train_rule import QUOTING, own_voice
+from er_gym.data.train_rule import QUOTING, own_voice, repeats_own_words
 from er_gym.data.trajectory import Cost, Trajectory
 from er_gym.rollout.play import episode_seed
 from er_gym.rollout.records import EpisodeRecord, record_episode
@@ -125,7 +125,11 @@ def _cost(origin: Origin, trajectory: Trajectory) -> Iterator[str]:
         yield from compared("cost", trajectory.cost, Cost(), "the settings, which name no model")
         return
     models = {origin.model, trajectory.actor if trajectory.kind in QUOTING else ""} - {""}
-    asked = sum(any(each.writer in models for each in turn.thoughts) for turn in trajectory.turns)
+    asked = sum(
+        any(each.writer in models for each in turn.thoughts)
+        for index, turn in enumerate(trajectory.turns)
+        if not repeats_own_words(trajectory, index)  # paid for when it was played
+    )
     if trajectory.cost.requests < asked:
         yield (
             f"cost.requests is at least {asked}, one for each turn with a model's thoughts, "

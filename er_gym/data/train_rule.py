@@ -17,12 +17,17 @@ QUOTING = ("model", "played")
 """Kinds of trajectories with a model's own decisions and words."""
 
 
-def own_voice(trajectory: Trajectory, index: int) -> str:
-    """Who decided a turn and thought so itself; ``""`` if its thoughts were written for it."""
+def repeats_own_words(trajectory: Trajectory, index: int) -> bool:
+    """Whether a turn repeats an episode that failed, and has the thoughts of the agent there."""
     said = trajectory.correction
-    if trajectory.kind in QUOTING:
-        return trajectory.actor
-    return said.agent if said is not None and index <= said.first_wrong else ""
+    return said is not None and bool(said.agent) and index <= said.first_wrong
+
+
+def own_voice(trajectory: Trajectory, index: int) -> str:
+    """Who decided a turn and may have thought so itself; ``""`` if thoughts are written for it."""
+    if trajectory.correction is not None and repeats_own_words(trajectory, index):
+        return trajectory.correction.agent
+    return trajectory.actor if trajectory.kind in QUOTING else ""
 
 
 def _after_the_beginning(trajectory: Trajectory, index: int, turn: Turn) -> bool:

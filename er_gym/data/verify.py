@@ -23,7 +23,7 @@ from er_gym.data.pictures import Encoding
 from er_gym.data.reenactment import NOBODY, Reenact
 from er_gym.data.replay import replay
 from er_gym.data.shown_pictures import Album
-from er_gym.data.train_rule import own_voice
+from er_gym.data.train_rule import own_voice, repeats_own_words
 from er_gym.data.trajectory import Trajectory
 from er_gym.data.turn_checks import turn_problems
 from er_gym.envs.embodied_env import EmbodiedEnv
@@ -195,6 +195,15 @@ def thought_problems(
                     yield f"turn {index}: {thought.kind}: {refusal.code}: {refusal.detail}"
 
 
+def _written_anew(trajectory: Trajectory) -> int:
+    """How many thoughts a reenactment writes anew: all but what a failed agent itself thought."""
+    return sum(
+        len(turn.thoughts)
+        for index, turn in enumerate(trajectory.turns)
+        if not repeats_own_words(trajectory, index)
+    )
+
+
 def _batches(lines: Sequence[Line], tasks: Iterable[Task]) -> list[_Batch]:
     """The work, in portions that keep a worker's room warm."""
     wanted = {line.task_id for line in lines}
@@ -256,7 +265,7 @@ class _Worker:
             turns=trajectory.actions,
             pictures=trajectory.pictures if self._folder else 0,
             thoughts=thoughts if self._critic_works else 0,
-            anew=thoughts if anew else 0,
+            anew=_written_anew(trajectory) if anew else 0,
             sentences=read["sentences"],
             unread=read["unread"],
         )

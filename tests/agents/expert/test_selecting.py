@@ -389,6 +389,9 @@ def test_a_correction_may_begin_with_the_words_of_who_failed(tmp_path: Path) -> 
     chinese = ("--own-thoughts", "--language", "zh", "--out", tmp_path / "zh")
     assert "thought in en, not in zh" in refusal("collect", "--correct", run, *chinese)
     assert problems(out, load_suite("mini").tasks) == []
+    told = done("data", "verify", out, "--no-pictures", "--workers", 1)
+    repeated = sum(one.correction.first_wrong + 1 for one in own.values() if one.correction)
+    assert f"\n{repeated} thoughts were not written anew" in told
     file = out / "trajectories.jsonl"
     kept = file.read_text()
     for old, new, told in (
