@@ -223,9 +223,10 @@ def correction_strata(
     begun: set[tuple[str, tuple[Action, ...]]] = set()
     for episode in run_directory.episodes():
         task = by_id.get(episode.task_id)
-        for beginning in correction_points(episode, after, max_steps):
-            if own_thoughts_in and not beginning.problem:
-                beginning = _with_own_thoughts(beginning, run_directory, episode, own_thoughts_in)
+        beginnings = correction_points(episode, after, max_steps)
+        if own_thoughts_in and task and not any(one.problem for one in beginnings):
+            beginnings = _with_own_thoughts(beginnings, run_directory, episode, own_thoughts_in)
+        for beginning in beginnings:
             problem = beginning.problem if task else "its task is not among the suite's"
             if not problem and (episode.task_id, beginning.actions) in begun:
                 problem = "another sample of its task begins alike"
@@ -255,17 +256,18 @@ def correction_strata(
 
 
 def _with_own_thoughts(
-    beginning: Beginning, run: RunDirectory, episode: EpisodeRecord, language: Language
-) -> Beginning:
-    """The beginning of a failed episode with what its agent thought; it has a ``problem`` if that
-    is not recorded, or in another language."""
+    beginnings: Sequence[Beginning], run: RunDirectory, episode: EpisodeRecord, language: Language
+) -> list[Beginning]:
+    """The beginnings of a failed episode with what its agent thought; one that has a ``problem`` if
+    that is not recorded, or in another language."""
     words = recorded_replies(run.path, episode)
     if words is None or words.silent:
-        return Beginning(problem="its agent left no thoughts")
+        return [Beginning(problem="its agent left no thoughts")]
     if words.language != language:
-        return Beginning(problem=f"its agent thought in {words.language}, not in {language}")
-    said = tuple(turn.thoughts for turn in words.turns[: len(beginning.actions)])
-    return replace(beginning, agent=run.manifest.agent, said=said)
+        return [Beginning(problem=f"its agent thought in {words.language}, not in {language}")]
+    said = tuple(turn.thoughts for turn in words.turns)
+    agent = run.manifest.agent
+    return [replace(one, agent=agent, said=said[: len(one.actions)]) for one in beginnings]
 
 
 def corrections_recipe(max_steps: int | None = None) -> Recipe:
