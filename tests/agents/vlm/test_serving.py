@@ -348,17 +348,30 @@ STUBBORN = """
     import os, signal, time
     signal.signal(signal.SIGTERM, lambda *_: print("no", flush=True))
     print("pid", os.getpid(), flush=True)
-    time.sleep(600)
+    while True:
+        time.sleep(0.01)
 """
 
 
-def test_a_server_that_does_not_heed_signals_is_killed(stand_in):
-    short = (
-        "import sys; from benchmarks.cli import process_guard as guard; guard.GRACE = 3; "
-        "sys.exit(guard.main(sys.argv[1:]))"
-    )
+def test_a_server_that_does_not_heed_signals_is_killed(stand_in, tmp_path):
+    # The time of grace is over once the server has answered, however busy the machine is. Until
+    # then, the file is missing.
+    answered = tmp_path / "answered"
+    guard = f"""
+import os, sys, time
+from benchmarks.cli import process_guard as guard
+
+real = time.sleep
+
+def until_answered(_):
+    while not os.path.exists({str(answered)!r}):
+        real(0.01)
+
+guard.time.sleep = until_answered
+sys.exit(guard.main(sys.argv[1:]))
+"""
     guarded = subprocess.Popen(
-        [sys.executable, "-c", short, *stand_in(STUBBORN).argv],
+        [sys.executable, "-c", guard, *stand_in(STUBBORN).argv],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -367,8 +380,9 @@ def test_a_server_that_does_not_heed_signals_is_killed(stand_in):
     with guarded:
         pid = int(guarded.stdout.readline().split()[1])
         guarded.stdin.close()
+        assert guarded.stdout.readline() == "no\n"
+        answered.touch()
         assert guarded.wait(60) == 128 + signal.SIGKILL
-        assert guarded.stdout.read() == "no\n"
     assert not alive(pid)
 
 
