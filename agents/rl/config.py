@@ -45,6 +45,7 @@ class EnvConfig(StrictSettings):
             (:class:`er_gym.envs.wrappers.KeyActionShaping`).
         reward: a wrapper that changes the reward, in training only: ``package.module:Name``, or the
             name of an entry point (:mod:`agents.rl.rewards`); "" for none.
+        faults: the rate at which actions go wrong (:mod:`er_gym.envs.faults`), in training only.
         max_steps: the step limit of an episode; None for the task type's own.
     """
 
@@ -63,6 +64,7 @@ class EnvConfig(StrictSettings):
     success_bonus: float = Field(1.0, ge=0)
     shaping: float = Field(0.0, ge=0)
     reward: str = ""
+    faults: float = Field(0.0, ge=0, le=1)
     max_steps: Positive | None = None
 
     _types = field_validator("types")(canonical_names)

@@ -30,12 +30,12 @@ from er_gym.envs.vector.member import MemberEnv
 from er_gym.envs.wrappers import KeyActionShaping
 from er_gym.tasks.types import TaskType, types_named
 
-_OWN_REWARD = {
+_NOT_IN_TRAINING = {
     "key_actions": 1.0,
-    **dict.fromkeys(("step_penalty", "illegal_penalty", "success_bonus", "shaping"), 0.0),
+    **dict.fromkeys(("step_penalty", "illegal_penalty", "success_bonus", "shaping", "faults"), 0.0),
     "reward": "",
 }
-"""The fields that change the reward, each with the value that leaves it as it is."""
+"""The fields of training only, each with the value that changes nothing."""
 ADVICE = "advice"
 """The key of an advised environment's observation."""
 
@@ -239,6 +239,7 @@ def make_env(
         instances=options.instances,
         step_penalty=options.step_penalty,
         illegal_penalty=options.illegal_penalty,
+        faults=options.faults,
         max_steps=options.max_steps,
     )
     env: gymnasium.Env[Any, Any] = TrainingRules(
@@ -256,5 +257,6 @@ def make_env(
 
 
 def evaluation_config(options: EnvConfig, episodes: str) -> EnvConfig:
-    """The same configuration for other episodes, with the environment's own reward."""
-    return options.model_copy(update={"episodes": episodes, **_OWN_REWARD})
+    """The same configuration for other episodes, with the environment's own reward and no
+    faults."""
+    return options.model_copy(update={"episodes": episodes, **_NOT_IN_TRAINING})

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from agents.rl.config import EnvConfig
 from agents.rl.envs import evaluation_config, make_env
 from benchmarks.cli.main import cli
-from er_gym.envs.actions import INDEX, Action
+from er_gym.envs.actions import ACTIONS, INDEX, Action
+from er_gym.envs.faults import KIND_OF_VERB
 from er_gym.plugins import PluginError
 from tests.support import in_one_test
 
@@ -73,6 +75,20 @@ def test_it_is_the_reward_in_training_and_none_in_evaluation() -> None:
     assert first_reward(doubled) == 2 * plain + 1
     assert first_reward(curious) == plain + 10
     assert first_reward(evaluation_config(doubled, "mini")) == 0.0
+
+
+def test_actions_go_wrong_in_training_and_not_in_evaluation() -> None:
+    always = OPTIONS.model_copy(update={"faults": 1.0})
+    faults = []
+    for options in (OPTIONS, always, evaluation_config(always, "mini")):
+        env = make_env(options)
+        env.reset(seed=0)
+        legal = np.flatnonzero(env.get_wrapper_attr("action_masks")())
+        move = next(i for i in legal if ACTIONS[i].verb in KIND_OF_VERB)
+        faults.append(env.step(move)[4]["fault"])
+        env.close()
+    assert faults == ["", faults[1], ""]
+    assert faults[1]
 
 
 WRONG = {
