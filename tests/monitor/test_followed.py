@@ -55,13 +55,13 @@ def test_one_thread_at_a_time_uses_a_directory_and_others_go_on() -> None:
     with followed.use(directory("a")):
         same = threading.Thread(target=use, args=("a",), daemon=True)
         same.start()
-        assert began.wait(10)
+        assert began.wait(60)
         other = threading.Thread(target=followed.use(directory("b")).__enter__, daemon=True)
         other.start()
-        other.join(10)
+        other.join(60)
         assert not other.is_alive(), "another directory does not wait"
         assert not ended.wait(0.2), "the same directory does"
-    same.join(10)
+    same.join(60)
     assert ended.is_set()
 
 

@@ -144,7 +144,7 @@ def test_success_is_worth_a_bonus_in_training_and_none_in_evaluation() -> None:
 def test_a_worker_that_dies_is_reported(vec: WorkerVecEnv) -> None:
     vec.reset()
     os.kill(vec._processes[1].pid or 0, signal.SIGKILL)
-    vec._processes[1].join(5)
+    vec._processes[1].join(60)
     with pytest.raises(RuntimeError, match="worker process 2 of 2 died with exit code -9"):
         vec.step(first_legal(vec))
 

@@ -659,7 +659,7 @@ def test_who_waits_for_a_turn_is_let_go() -> None:
     waiting = threading.Thread(target=wait)
     waiting.start()
     run.close()
-    waiting.join(10)
+    waiting.join(60)
     assert str(raised[0]) == "the client has been closed"
 
 
@@ -819,4 +819,4 @@ def test_those_who_wait_are_let_go_when_the_run_stops(
             for each in asked:
                 with pytest.raises(CannotGoOn, match="401, incorrect key"):
                     each.result()
-        assert time.monotonic() - began < 5
+        assert time.monotonic() - began < 50  # else it waits for a minute
