@@ -158,6 +158,7 @@ class _Ladder:
             *("collect", "--correct", self.make.at(run), "--allow-empty"),
             *(("--correct-after", after) if (after := sample.correct_after) != "wrong" else ()),
             *(("--correct-by", sample.correct_by) if sample.correct_by != "expert" else ()),
+            *(("--own-thoughts",) * sample.own_thoughts),
             *self.make.collecting(sample.limit),
         )
 

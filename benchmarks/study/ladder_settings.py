@@ -71,6 +71,7 @@ class Sampled(StrictSettings):
         correct_after: of its failures, after which action the expert takes over
             (:data:`agents.expert.corrections.CorrectAfter`).
         correct_by: who takes over (:data:`agents.expert.corrections.CorrectBy`).
+        own_thoughts: whether what a correction repeats keeps the thoughts of the agent that failed.
         successes: in the third stage, whether its successes are learnt from, too; those with
             failed actions among them, but for the failed turns.
         earlier: whether the failures among the samples of earlier stages are corrected, too.
@@ -87,6 +88,7 @@ class Sampled(StrictSettings):
     limit: Positive | None = None
     correct_after: CorrectAfter = "wrong"
     correct_by: CorrectBy = "expert"
+    own_thoughts: bool = False
     successes: bool = False
     earlier: bool = False
     rewrite_thoughts: bool = False
@@ -181,7 +183,7 @@ class LadderSettings(PlaySettings):
 
 def _of_corrections(sample: Sampled) -> list[str]:
     """The settings that only a stage with corrections may have and that differ from the default."""
-    names = ("correct_after", "correct_by", "successes", "earlier")
+    names = ("correct_after", "correct_by", "own_thoughts", "successes", "earlier")
     return [name for name in names if getattr(sample, name) != Sampled.model_fields[name].default]
 
 

@@ -116,7 +116,8 @@ def test_failures_of_earlier_stages_are_corrected_too(tmp_path: Path) -> None:
 def test_the_third_stage_learns_from_faults_and_from_what_is_new_to_the_model(
     tmp_path: Path,
 ) -> None:
-    settings = LADDER.load("er-tiny-text", ["stages.reflection.teacher.faults=0.2"])
+    changed = ["stages.reflection.teacher.faults=0.2", "stages.reflection.sample.own_thoughts=true"]
+    settings = LADDER.load("er-tiny-text", changed)
     plan = {phase.name: phase.command for phase in Study(LADDER, tmp_path, settings).plan.phases}
     assert option(plan["3-reflection/teacher"], "--faults") == ["0.2"]
     assert option(plan["3-reflection/sample"], "--faults") == ["0.1"]
@@ -126,6 +127,7 @@ def test_the_third_stage_learns_from_faults_and_from_what_is_new_to_the_model(
     assert option(plan["3-reflection/sample"], "--skip") == learnt
     assert option(plan["3-reflection/teacher"], "--skip") == learnt
     assert option(plan["3-reflection/correct"], "--correct-by") == ["searcher"]
+    assert "--own-thoughts" in plan["3-reflection/correct"]
     assert "--keep-failed" in plan["3-reflection/select"]
     assert "--rewrite-thoughts" in plan["3-reflection/select"]
     assert option(plan["3-reflection/select"], "--balance") == ["none"]
@@ -200,12 +202,12 @@ BAD = {
             "stages": {
                 **SMALL["stages"],
                 "exploration": {
-                    "sample": {"tasks": 1, "correct_by": "searcher", "successes": True},
+                    "sample": {"tasks": 1, "own_thoughts": True, "successes": True},
                     "finetune": "tiny",
                 },
             }
         },
-        "exploration corrects nothing; leave out correct_by and successes",
+        "exploration corrects nothing; leave out own_thoughts and successes",
     ),
 }
 
