@@ -15,6 +15,8 @@ from agents.vlm.prompts import prompts_for
 from agents.vlm.tuned_model import AGENT
 from agents.zoo.card import Figure, Rate
 from agents.zoo.index import PLAYERS, PREFIX
+from benchmarks.cli.suites import fresh_suite
+from benchmarks.leaderboard.months import fresh_of
 from benchmarks.scoring.metrics import Summary
 from benchmarks.scoring.report import RunReport, by_group, slices
 from benchmarks.scoring.scorers import CORRECTED
@@ -50,11 +52,11 @@ def figure_of(report: RunReport, name: str, source: Path) -> Figure:
             "er-gym bench plays what is missing"
         )
     played_by = _player(report, name, source)
-    suite = _suite(report)
+    name, fresh, suite = _suite(report)
     ended = max((event.time for event in read_events(report.path)), default=0.0)
     return Figure(
-        suite=suite.name,
-        options=shlex.join([*_tasks(report, suite), *_rules(report, suite)]),
+        suite=name,
+        options=shlex.join([*fresh, *_tasks(report, suite), *_rules(report, suite)]),
         played_by=played_by,
         date=datetime.fromtimestamp(ended, timezone.utc).date(),
         er_gym=report.manifest.er_gym,
@@ -91,20 +93,25 @@ def _player(report: RunReport, name: str, source: Path) -> str:
     )
 
 
-def _suite(report: RunReport) -> Suite:
+def _suite(report: RunReport) -> tuple[str, list[str], Suite]:
+    """The name of the suite that was played, the option that makes its tasks anew, and the tasks.
+
+    Fresh tasks that are no longer there are made again.
+    """
     manifest = report.manifest
-    if manifest.suite not in suite_names():
+    name, seed = fresh_of(manifest.suite) or (manifest.suite, None)
+    if name not in suite_names():
         raise ValueError(
             f"{report.path} plays {manifest.suite}, which does not come with er-gym; give runs of "
-            f"{', '.join(suite_names())}"
+            f"{', '.join(suite_names())}, or of their fresh tasks"
         )
-    suite = load_suite(manifest.suite)
+    suite = load_suite(name) if seed is None else fresh_suite(name, seed, workers=1)
     if suite.digest != manifest.suite_digest:
         raise ValueError(
             f"{report.path} was played with other tasks than the suite {suite.name} has now; "
             "play it again"
         )
-    return suite
+    return name, [] if seed is None else ["--fresh", str(seed)], suite
 
 
 def _tasks(report: RunReport, suite: Suite) -> list[str]:

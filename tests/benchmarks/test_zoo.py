@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -172,10 +173,31 @@ def test_the_options_of_a_run_are_found(
     assert figure_of(run, "walker", trained).options == options
 
 
+def test_fresh_tasks_give_a_figure(
+    trained: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, repository: Path
+) -> None:
+    from benchmarks.cli.zoo_figures import figure_of
+    from benchmarks.scoring.report import load_run
+
+    monkeypatch.setenv("ER_GYM_HOME", str(tmp_path / "home"))
+    (tmp_path / "home" / "suites").mkdir(parents=True)
+    mini = repository / "er_gym" / "tasks" / "data" / "mini.jsonl.gz"
+    shutil.copy(mini, tmp_path / "home" / "suites" / "mini-fresh-5.jsonl.gz")
+    name, faults = "mini-fresh-5", {"faults": 0.1}
+    run = load_run(played(tmp_path / "a", f"rl:{trained}", PICKUPS, faults, suite=name))
+    figure = figure_of(run, "walker", trained)
+    told = (figure.suite, figure.options)
+    assert told == ("mini", "--fresh 5 --types single_pickup --faults 0.1")
+    other = played(tmp_path / "b", f"rl:{trained}", PICKUPS, suite=name, suite_digest="abc")
+    with pytest.raises(ValueError, match="other tasks than the suite mini-fresh-5 has now"):
+        figure_of(load_run(other), "walker", trained)
+
+
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "another agent": ({"agent": "random"}, "was played by random, not by"),
     "another model": ({"agent": "zoo:runner"}, "was played by zoo:runner, not by"),
     "another suite": ({"suite": "mine"}, "plays mine, which does not come with er-gym"),
+    "fresh tasks of another suite": ({"suite": "mine-fresh-5"}, "or of their fresh tasks"),
     "other tasks": ({"suite_digest": "abc"}, "other tasks than the suite mini has now"),
     "another room": ({"env": {"grid_size": 0.5}}, "played with grid_size 0.5, and mini has"),
     "picked tasks": ({"tasks": PICKUPS[1:3]}, "neither all, nor all of some types"),
