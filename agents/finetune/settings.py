@@ -78,9 +78,6 @@ class DataSettings(StrictSettings):
             an object type is replaced by random syllables. A model from random weights learns so to
             read instructions with words that are new to it. Only for collections; frames beside
             them stay as they are.
-        name_noise: with this probability, each type that an English instruction names has a made-up
-            name in the whole conversation, so that a model learns to take names from what it is
-            told. Only for collections, in a dialect without pictures.
         max_length: the most tokens of a conversation. A longer one is an error: to cut it would cut
             pictures.
         min_pixels, max_pixels: a picture with fewer or more is scaled.
@@ -93,7 +90,6 @@ class DataSettings(StrictSettings):
     language: Language | None = None
     mask: Mask = "turns"
     word_noise: Fraction = 0.0
-    name_noise: Fraction = 0.0
     max_length: Positive = 32_768
     min_pixels: Positive = 3_136
     max_pixels: Positive = 180_000
@@ -116,18 +112,17 @@ class DataSettings(StrictSettings):
         """Whether a trajectory of this part and kind is used."""
         return (not self.parts or part in self.parts) and (not self.kinds or kind in self.kinds)
 
-    def refuse_noise(self, path: Path) -> None:
-        """Refuse made-up words where instructions cannot be told from other words.
+    def refuse_word_noise(self, path: Path) -> None:
+        """Refuse word noise where instructions cannot be told from other words.
 
         Raises:
-            ValueError: they are asked for, and the path is no collection.
+            ValueError: it is asked for, and the path is no collection.
         """
-        for name in ("word_noise", "name_noise"):
-            if share := getattr(self, name):
-                raise ValueError(
-                    f"{path} is no collection of er-gym collect, and data.{name}={share} is for "
-                    f"those; set data.{name}=0"
-                )
+        if self.word_noise:
+            raise ValueError(
+                f"{path} is no collection of er-gym collect, and data.word_noise={self.word_noise} "
+                "is for those; set data.word_noise=0"
+            )
 
     def check_choice(self, where: str, trajectories: Iterable[Trajectory]) -> None:
         """Refuse a part or a kind that no trajectory has.

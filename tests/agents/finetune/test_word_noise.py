@@ -9,11 +9,10 @@ import pytest
 from click.testing import CliRunner
 
 from agents.finetune.launchers.sources import open_source
-from agents.finetune.noise import with_name_noise, with_word_noise
 from agents.finetune.samples import open_samples
 from agents.finetune.settings import DataSettings
+from agents.finetune.word_noise import with_word_noise
 from benchmarks.cli.main import cli
-from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import Collection
 from er_gym.tasks.wordings.names import types_by_name
 
@@ -47,17 +46,16 @@ def test_some_words_are_made_up_and_names_stay(played: Collection) -> None:
     assert with_word_noise(chinese, 1) == chinese
 
 
-def test_noise_is_for_collections(tmp_path: Path) -> None:
+def test_word_noise_is_for_collections(tmp_path: Path) -> None:
     """A conversation of a ShareGPT file does not say which of its words are the instruction."""
     file = tmp_path / "chats.json"
     file.write_text("[]")
-    for name in ("word_noise", "name_noise"):
-        settings = DataSettings.model_validate({name: 0.1})
-        refused = rf"chats\.json is no collection .* set data.{name}=0"
-        with pytest.raises(ValueError, match=refused):
-            open_samples([file], settings)
-        with pytest.raises(ValueError, match=refused):
-            open_source(file, settings)
+    settings = DataSettings(word_noise=0.1)
+    for opened in (lambda: open_samples([file], settings), lambda: open_source(file, settings)):
+        with pytest.raises(
+            ValueError, match=r"chats\.json is no collection .* set data.word_noise=0"
+        ):
+            opened()
 
 
 def test_word_noise_leaves_frames_as_they_are(played: Collection, tmp_path: Path) -> None:
@@ -88,62 +86,3 @@ def test_only_the_instruction_of_what_is_learnt_is_noisy(played: Collection) -> 
             assert instructions[before.id] in turn.text
     told = [chat.turns for chat in open_source(played.path, settings).chats()]
     assert told == [chat.turns for chat in noisy.chats]
-
-
-TOLD = "Put the tissue box in the Box, not the Refrigerator."
-TALK = (
-    ("system", "There may be a TissueBox."),
-    ("user", f"{TOLD}\nsee TissueBox far, Box, Fridge closed, Boxes, Mug"),
-    ("assistant", "goal pickup TissueBox to Box; TissueBox seen"),
-    ("user", "Is the fridge behind the tissue box?"),
-)
-
-
-def talk(name: str) -> Chat:
-    return Chat(name, tuple(ChatTurn(role, (text,)) for role, text in TALK))  # type: ignore[arg-type]
-
-
-def test_a_name_is_made_up_wherever_it_is_mentioned() -> None:
-    whole = with_name_noise(talk("one"), TOLD, 1)
-    system, asked, thought, question = (turn.text for turn in whole.turns)
-    assert system == TALK[0][1]
-    tissue, box = re.findall(r"pickup ([A-Z][a-z]{5,}) to ([A-Z][a-z]{5,});", thought)[0]
-    fridge = re.findall(r"not the ([A-Z][a-z]{5,})\.", asked)[0]
-    assert not {tissue.lower(), box.lower(), fridge.lower()} & {*types_by_name()}
-    assert len({tissue, box, fridge}) == 3
-    said = f"Put the {tissue.lower()} in the {box}, not the {fridge}."
-    assert asked == f"{said}\nsee {tissue} far, {box}, {fridge} closed, Boxes, Mug"
-    assert thought == f"goal pickup {tissue} to {box}; {tissue} seen"
-    assert question == f"Is the {fridge.lower()} behind the {tissue.lower()}?"
-
-
-def test_a_share_of_names_is_made_up() -> None:
-    changed = []
-    for number in range(300):
-        chat = talk(f"t{number}")
-        noisy = with_name_noise(chat, TOLD, 0.3)
-        assert noisy == with_name_noise(chat, TOLD, 0.3)
-        changed += [name not in noisy.turns[1].text for name in ("TissueBox", " Box,", "Fridge")]
-    assert 0.25 < sum(changed) / len(changed) < 0.35
-    assert with_name_noise(chat, TOLD, 0) is chat
-    assert with_name_noise(chat, "把CD放到床上。", 1).turns == chat.turns
-
-
-def test_names_are_made_up_in_what_is_learnt(played: Collection) -> None:
-    settings = DataSettings(dialect="text", name_noise=0.5)
-    plain = open_samples([played.path], DataSettings(dialect="text"))
-    noisy = open_samples([played.path], settings)
-    assert noisy.digest != plain.digest
-    whole = open_samples([played.path], settings.model_copy(update={"name_noise": 1.0}))
-    for before, after, each in zip(plain.chats, whole.chats, played.trajectories(), strict=True):
-        assert before.train == after.train
-        kinds = {types_by_name()[name] for name in types_by_name() if name in each.instruction}
-        assert not [kind for kind in kinds for turn in after.turns if f" {kind};" in turn.text]
-    told = [chat.turns for chat in open_source(played.path, settings).chats()]
-    assert told == [chat.turns for chat in noisy.chats]
-
-
-def test_names_are_not_made_up_beside_pictures(played: Collection) -> None:
-    settings = DataSettings(dialect="paper", name_noise=0.5)
-    with pytest.raises(ValueError, match=r"pictures show what things are; set data.name_noise=0"):
-        open_samples([played.path], settings)
