@@ -43,6 +43,7 @@ def figure_of(report: RunReport, name: str, source: Path) -> Figure:
     Raises:
         ValueError: another agent played, an episode crashed or is missing, or the command line
             cannot say which tasks were played.
+        BadInput, click.exceptions.Exit: fresh tasks that are no longer there cannot be made again.
     """
     scores = report.scores[CORRECTED.name]
     if report.crashed or report.unusable or not scores:
@@ -52,10 +53,10 @@ def figure_of(report: RunReport, name: str, source: Path) -> Figure:
             "er-gym bench plays what is missing"
         )
     played_by = _player(report, name, source)
-    name, fresh, suite = _suite(report)
+    suite_name, fresh, suite = _suite(report)
     ended = max((event.time for event in read_events(report.path)), default=0.0)
     return Figure(
-        suite=name,
+        suite=suite_name,
         options=shlex.join([*fresh, *_tasks(report, suite), *_rules(report, suite)]),
         played_by=played_by,
         date=datetime.fromtimestamp(ended, timezone.utc).date(),
