@@ -30,12 +30,12 @@ from er_gym.envs.vector.member import MemberEnv
 from er_gym.envs.wrappers import KeyActionShaping
 from er_gym.tasks.types import TaskType, types_named
 
-_NOT_IN_TRAINING = {
+_IN_EVALUATION = {
     "key_actions": 1.0,
     **dict.fromkeys(("step_penalty", "illegal_penalty", "success_bonus", "shaping", "faults"), 0.0),
     "reward": "",
 }
-"""The fields of training only, each with the value that changes nothing."""
+"""The fields of training only, each with its value in evaluation, which changes nothing."""
 ADVICE = "advice"
 """The key of an advised environment's observation."""
 
@@ -259,4 +259,4 @@ def make_env(
 def evaluation_config(options: EnvConfig, episodes: str) -> EnvConfig:
     """The same configuration for other episodes, with the environment's own reward and no
     faults."""
-    return options.model_copy(update={"episodes": episodes, **_NOT_IN_TRAINING})
+    return options.model_copy(update={"episodes": episodes, **_IN_EVALUATION})
