@@ -78,7 +78,7 @@ class RLAgent:
         config = load_config(file.parent / CONFIG)
         self._policy = _loaded(file, file.stat().st_mtime_ns)
         self._policy_observation = PolicyObservation(config.env)
-        self.obs_mode: str = config.env.obs_mode
+        self.obs_mode: str = config.env.needed
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """Begin an episode.

@@ -153,6 +153,8 @@ def divergence(start: Tensor, now: Tensor, legal: Tensor) -> Tensor:
 def starting_network(config: TrainConfig, start: Start) -> TypeNetwork:
     """The network of the policy that a run starts from.
 
+    Where the run observes sightings and the policy did not, it does not look at them at first.
+
     Raises:
         ValueError: there is no such policy, it cannot be read, or it is another network than the
             run's.
@@ -164,13 +166,16 @@ def starting_network(config: TrainConfig, start: Start) -> TypeNetwork:
         network = load_network(file)
     except ValueError as error:
         raise ValueError(f"start.policy {name}: {error}") from error
-    theirs, mine = network.state_dict(), untrained_network(config).state_dict()
+    mine = untrained_network(config)
+    if config.env.sightings:
+        network.add_sightings()
+    theirs, wanted = network.state_dict(), mine.state_dict()
     if {key: each.shape for key, each in theirs.items()} != {
-        key: each.shape for key, each in mine.items()
+        key: each.shape for key, each in wanted.items()
     }:
         raise ValueError(
             f"start.policy {name} observes something else than this run, or its network has "
-            f"another shape: take env (obs_mode, subtasks, instruction) and network from "
-            f"{file.parent / CONFIG}"
+            "another shape: take env (obs_mode, subtasks, sightings, instruction) and network "
+            f"from {file.parent / CONFIG}"
         )
     return network

@@ -31,6 +31,9 @@ class EnvConfig(StrictSettings):
             offered: its numbers only name objects, so a network cannot calculate with them.)
         subtasks: whether the policy also observes the current subtask of the instruction, and where
             it has searched for its object (:mod:`agents.rl.subtask_memory`).
+        sightings: whether it also observes where the things of the subtask were seen, also from
+            afar, and how many objects of each type (:mod:`agents.rl.sighting_memory`); with
+            ``subtasks``.
         instruction: the encoder of the instruction, as
             :func:`er_gym.envs.wrappers.make_encoder` has it; "" for none, since ``state`` says
             which types it names.
@@ -53,6 +56,7 @@ class EnvConfig(StrictSettings):
     types: tuple[str, ...] = ()
     obs_mode: Literal["state", "rgb+state", "depth+state", "rgb+depth+state"] = "state"
     subtasks: bool = False
+    sightings: bool = False
     instruction: str = ""
     width: Annotated[int, Field(gt=0, le=2048)] = 128
     height: Annotated[int, Field(gt=0, le=2048)] = 72
@@ -68,6 +72,19 @@ class EnvConfig(StrictSettings):
     max_steps: Positive | None = None
 
     _types = field_validator("types")(canonical_names)
+
+    @model_validator(mode="after")
+    def _sightings_are_of_subtasks(self) -> EnvConfig:
+        if self.sightings and not self.subtasks:
+            raise ValueError(
+                "sightings are of the things of the subtask at hand: give subtasks=true, too"
+            )
+        return self
+
+    @property
+    def needed(self) -> str:
+        """The observations that the environment must give, as its ``obs_mode``."""
+        return f"{self.obs_mode}+objects" if self.sightings else self.obs_mode
 
 
 class VecEnvConfig(StrictSettings):
@@ -252,7 +269,8 @@ def how_learnt(config: TrainConfig, steps: int) -> str:
         parts.append(f"the weights of {config.start.policy}")
     if steps or not parts:
         parts.append(f"{steps:,} steps of {ALGORITHM_NAMES[config.algorithm.name]}")
-    observed = f"{config.env.obs_mode}{' and subtask' * config.env.subtasks}"
+    more = (("subtask", config.env.subtasks), ("sightings", config.env.sightings))
+    observed = " and ".join([config.env.obs_mode, *(name for name, given in more if given)])
     return f"{', then '.join(parts)} on {observed}"
 
 

@@ -132,10 +132,12 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         position = 0 if moment is None else moment.left
         self._started_at = position and self._positions.get(info["task_type"], position)
         info |= {"seen": obs, "started_at": self._started_at}
+        observation = self.policy_observation
+        told = observation.told(self, info)
         if moment is None:
-            return self.policy_observation.reset(obs, info, info["instruction"]), info
-        self.policy_observation.recall(moment.memory)
-        return self.policy_observation.observe(obs, info), info
+            return observation.reset(obs, told, info["instruction"]), info
+        observation.recall(moment.memory)
+        return observation.observe(obs, told), info
 
     def _next(self) -> dict[str, Any]:
         """The options of the next episode: its task, or where it starts near its goal."""
@@ -155,7 +157,8 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         """Do an action."""
         obs, reward, terminated, truncated, info = self.env.step(action)
         info |= {"seen": obs, "started_at": self._started_at}
-        return self.policy_observation.observe(obs, info), reward, terminated, truncated, info
+        seen = self.policy_observation.observe(obs, self.policy_observation.told(self, info))
+        return seen, reward, terminated, truncated, info
 
     def action_masks(self) -> NDArray[np.int8]:
         """(A,) int8, the actions that are legal now."""
@@ -233,7 +236,7 @@ def make_env(
     """
     member = MemberEnv(
         (),
-        obs_mode=f"{options.obs_mode}+text" if with_text else options.obs_mode,
+        obs_mode=f"{options.needed}+text" if with_text else options.needed,
         width=options.width,
         height=options.height,
         instances=options.instances,

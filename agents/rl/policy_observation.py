@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from agents.rl.config import EnvConfig
+from agents.rl.sighting_memory import SIGHTING_LAYOUT, SightingMemory
 from agents.rl.subtask_memory import SUBTASK_LAYOUT, SubtaskMemory
 from er_gym.envs.actions import ACTIONS
+from er_gym.envs.info import with_details
 from er_gym.envs.observations import STATE_LAYOUT
 from er_gym.envs.wrappers import make_encoder
 
@@ -31,6 +33,7 @@ class PolicyObservation:
 
     - ``state``: as in the environment's observation.
     - ``subtask``: (S,) float32 in [0, 1], see :mod:`agents.rl.subtask_memory`.
+    - ``sightings``: (S,) float32 in [0, 1], see :mod:`agents.rl.sighting_memory`.
     - ``instruction``: (E,) float32 in [-1, 1], with an encoder.
     - ``rgb``: (height, width, 3 × frames) uint8, the last pictures, the newest last; at the
       beginning the first is repeated.
@@ -50,6 +53,10 @@ class PolicyObservation:
         self.subtasks: SubtaskMemory | None = None
         if options.subtasks:
             entries["subtask"] = spaces.Box(0.0, 1.0, (len(SUBTASK_LAYOUT),), np.float32)
+        self._with_sightings = options.sightings
+        self._sightings: SightingMemory | None = None
+        if options.sightings:
+            entries["sightings"] = spaces.Box(0.0, 1.0, (len(SIGHTING_LAYOUT),), np.float32)
         if self._encode is not None:
             entries["instruction"] = spaces.Box(-1.0, 1.0, (self._encode.dimension,), np.float32)
         self._images: dict[str, deque[NDArray[np.uint8]]] = {
@@ -69,14 +76,24 @@ class PolicyObservation:
         for images in self._images.values():
             images.clear()
         self.subtasks = SubtaskMemory(instruction) if self._with_subtasks else None
+        self._sightings = None
+        if self._with_sightings:
+            assert self.subtasks is not None  # the configuration sees to it
+            self._sightings = SightingMemory(self.subtasks.progress)
         self._told = self._encode(instruction) if self._encode is not None else None
         return self.observe(obs, info)
 
+    def told(self, env: Any, info: Mapping[str, Any]) -> Mapping[str, Any]:
+        """``info`` with what else of a step of ``env`` is observed."""
+        return with_details(env, info) if self._with_sightings else info
+
     def observe(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Obs:
-        """The next one."""
+        """The next one; for sightings, ``info`` has details (:meth:`told`)."""
         made: Obs = {"state": obs["state"]}
         if self.subtasks is not None:
             made["subtask"] = self.subtasks.update(info)
+        if self._sightings is not None:
+            made["sightings"] = self._sightings.update(info)
         if self._told is not None:
             made["instruction"] = self._told
         for name, images in self._images.items():
@@ -91,12 +108,13 @@ class PolicyObservation:
 
     def memory(self) -> bytes:
         """What is remembered of the earlier observations, for :meth:`recall` in this program."""
-        kept = self.subtasks, self._told, self._images
+        kept = self.subtasks, self._sightings, self._told, self._images
         return zlib.compress(pickle.dumps(kept), 1)
 
     def recall(self, memory: bytes) -> None:
         """Remember that in place of this episode's; the next is :meth:`observe`."""
-        self.subtasks, self._told, self._images = pickle.loads(zlib.decompress(memory))
+        kept = pickle.loads(zlib.decompress(memory))
+        self.subtasks, self._sightings, self._told, self._images = kept
 
     def _image(self, seen: NDArray[Any]) -> NDArray[np.uint8]:
         """A picture or a depth as (height, width, channels) uint8 of the learner's size."""

@@ -80,11 +80,12 @@ _FITS = {
 }
 
 
-def _logarithm(count: int) -> float:
+def logarithm(count: int) -> float:
+    """From 0 to 1, which is for twenty and more."""
     return min(1.0, log1p(count) / log1p(_MOST))
 
 
-_LOGARITHMS = np.array([_logarithm(count) for count in range(_MOST + 1)], np.float32)
+_LOGARITHMS = np.array([logarithm(count) for count in range(_MOST + 1)], np.float32)
 
 
 def _logarithms(counts: NDArray[np.intp]) -> NDArray[np.float32]:
@@ -181,7 +182,7 @@ class SubtaskMemory:
             ("all done", float(now is None)),
             ("left", min(left / 8, 1.0)),
             ("moved on", float(self.moved_on)),
-            ("since", _logarithm(self._since)),
+            ("since", logarithm(self._since)),
             ("observed", min(self.observed / 3, 1.0)),
             ("observed ever", float(self._observed_ever)),
             ("steps left", min(max(info["max_steps"] - info["steps"], 0) / _LONGEST, 1.0)),

@@ -25,7 +25,13 @@ from er_gym.tasks.task import Task
 
 TYPE = "ordered_pickup_two_object_and_put"
 OPTIONS = EnvConfig(
-    episodes="mini", subtasks=True, types=(TYPE,), shaping=1.0, key_actions=0.25, step_penalty=0.0
+    episodes="mini",
+    subtasks=True,
+    sightings=True,
+    types=(TYPE,),
+    shaping=1.0,
+    key_actions=0.25,
+    step_penalty=0.0,
 )
 GAMMA = 0.9
 
