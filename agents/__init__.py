@@ -10,11 +10,11 @@
     task = er_gym.load_suite("mini").tasks[0]
     record = er_gym.play_episode(env, agent, task, seed=0)
 
-A name is that of one of :data:`AGENTS` (``oracle``, ``random``, ``searcher``, ``mask-reader`` and
-those that cannot think: ``instruction-blind``, ``do-nothing`` and others), a class of your own
-(``package.module:Class``), a trained policy (``rl:RUN``), a model of the zoo (``zoo:NAME``), or a
-model agent (``openai:MODEL``, ``hf:PATH``). ``examples/own_agent.py`` writes one;
-``docs/agents.md`` explains those that ask models.
+A name is that of one of :data:`AGENTS` (``oracle``, ``random``, ``searcher``, ``spotter``,
+``mask-reader`` and those that cannot think: ``instruction-blind``, ``do-nothing`` and others), a
+class of your own (``package.module:Class``), a trained policy (``rl:RUN``), a model of the zoo
+(``zoo:NAME``), or a model agent (``openai:MODEL``, ``hf:PATH``). ``examples/own_agent.py`` writes
+one; ``docs/agents.md`` explains those that ask models.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from agents.factory import (
 )
 from agents.scripted.oracle import OracleAgent
 from agents.scripted.random import RandomAgent
-from agents.scripted.searcher import SearcherAgent
+from agents.scripted.searcher import SearcherAgent, SpotterAgent
 from agents.scripted.searcher.blind import InstructionBlindAgent
 from agents.scripted.searcher.mask_reader import MaskReaderAgent
 from agents.scripted.thoughtless import (
@@ -72,6 +72,7 @@ AGENTS: Registry[Callable[..., Agent]] = Registry(
         "oracle": OracleAgent,
         "random": RandomAgent,
         "searcher": SearcherAgent,
+        "spotter": SpotterAgent,
         "mask-reader": MaskReaderAgent,
         "instruction-blind": InstructionBlindAgent,
         "do-nothing": DoNothingAgent,

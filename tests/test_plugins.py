@@ -148,8 +148,8 @@ def test_the_command_knows_them_and_so_do_its_workers(tmp_path: Path) -> None:
     ("name", "message"),
     [
         ("sercher", r"unknown agent 'sercher' \(did you mean searcher\?\); choose one of: oracle, "
-         r"random, searcher, mask-reader, instruction-blind, do-nothing, always-end, repeat-last, "
-         r"takes-all, broken, impatient; package\.module:Name; rl:RUN .*; "
+         r"random, searcher, spotter, mask-reader, instruction-blind, do-nothing, always-end, "
+         r"repeat-last, takes-all, broken, impatient; package\.module:Name; rl:RUN .*; "
          r"openai:MODEL, "),
         ("", "unknown agent ''; choose one of"),
         ("household", "unknown agent 'household'"),

@@ -20,7 +20,7 @@ from agents.expert.explorer import ExplorerCourse, Strength
 from agents.expert.kinds import ORDERED_KIND, draw_mode
 from agents.expert.places import DrawnPlaces, PlaceChooser
 from agents.expert.recipe import ANOMALY, CORRECTED, EXPLORED, SEARCH, Part
-from agents.expert.takeover import SearcherCourse
+from agents.expert.takeover import SEARCHERS, SearcherCourse
 from agents.expert.thought_kinds import ThoughtKinds
 from er_gym.tasks.task import Task
 
@@ -84,8 +84,8 @@ class Candidate:
         random = Random(seed)
         task = self.played_task
         check = kinds.draw_check(task, random)
-        if self.beginning is not None and self.correct_by == "searcher":
-            return SearcherCourse(task, self.beginning.actions)
+        if self.beginning is not None and self.correct_by != "expert":
+            return SearcherCourse(task, self.beginning.actions, SEARCHERS[self.correct_by]())
         if self.beginning is not None:
             return CorrectedCourse(task, self.beginning.actions, random, check)
         if self.strength is not None:

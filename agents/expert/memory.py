@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import cos, radians
 
 from agents.expert.course import View
 from er_gym.data.claims import PARTS
-from er_gym.envs.object_view import ObjectView
+from er_gym.envs.object_view import ObjectView, apart
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import is_among, same_type
 
@@ -93,10 +92,5 @@ class Remembering:
 
 def nearest_to(goal: ObjectView, views: Iterable[ObjectView]) -> tuple[str, ...]:
     """The types of the objects in view, those nearest to an object in view first."""
-
-    def apart(view: ObjectView) -> float:
-        angle = radians(view.bearing - goal.bearing)
-        square = view.distance**2 + goal.distance**2
-        return square - 2 * view.distance * goal.distance * cos(angle)
-
-    return tuple(dict.fromkeys(view.object_type for view in sorted(views, key=apart)))
+    nearest = sorted(views, key=lambda view: apart(goal, view))
+    return tuple(dict.fromkeys(view.object_type for view in nearest))

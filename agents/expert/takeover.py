@@ -9,14 +9,16 @@ from agents.expert.course import Intent
 from agents.expert.legs import legs_of
 from agents.expert.memory import Remembering
 from agents.expert.replayed_intents import replayed_intent
-from agents.scripted.searcher import instruction
-from agents.scripted.searcher.agent import SearcherAgent
+from agents.scripted.searcher import SearcherAgent, SpotterAgent, instruction
 from agents.scripted.searcher.instruction import Goal
 from er_gym.envs.actions import Action
 from er_gym.rollout.agent import Decision
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import same_type
 from er_gym.tasks.task import KeyAction, Task
+
+SEARCHERS = {"searcher": SearcherAgent, "spotter": SpotterAgent}
+"""The searchers that can take over, by name."""
 
 
 class SearcherCourse(Remembering):
@@ -28,16 +30,17 @@ class SearcherCourse(Remembering):
     Args:
         task: the task.
         beginning: the actions, the wrong one last.
+        searcher: takes over.
     """
 
-    def __init__(self, task: Task, beginning: Sequence[Action]) -> None:
+    def __init__(self, task: Task, beginning: Sequence[Action], searcher: SearcherAgent) -> None:
         super().__init__()
-        self._task, self._beginning = task, beginning
+        self._task, self._beginning, self._searcher = task, beginning, searcher
         self._legs = legs_of(task)
 
     def intents(self) -> Iterator[Intent]:
         """See :class:`~agents.expert.course.Course`."""
-        searcher = SearcherAgent()
+        searcher = self._searcher
         searcher.reset(self._task, {}, self.view.info)
         for action in self._beginning:
             searcher.watch(action, self.view.info)

@@ -10,7 +10,7 @@ that sees them also tells one object from another of its type.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import cos, exp, radians, sqrt
+from math import exp
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from agents.rl.subtask_memory import logarithm
 from agents.rl.subtasks import Progress
 from er_gym.envs.info import detail
-from er_gym.envs.object_view import ObjectView
+from er_gym.envs.object_view import ObjectView, apart
 from er_gym.thor.objects import KIND_OF, TYPES
 
 ROLES = ("thing", "place")
@@ -99,7 +99,7 @@ class SightingMemory:
             for other in views:
                 kind = KIND_OF[other.object_type]
                 if other is not view:
-                    near[kind] = max(near.get(kind, 0.0), exp(-_apart(view, other)))
+                    near[kind] = max(near.get(kind, 0.0), exp(-apart(view, other)))
             yield name, _Sighting(KIND_OF.get(view.on), near)
 
     def _vector(self, ahead: Sequence[ObjectView], in_view: set[str]) -> NDArray[np.float32]:
@@ -121,10 +121,3 @@ class SightingMemory:
                 for kind, nearness in sighting.near.items():
                     table[_ROW[f"{role} near it"], kind] = worth * nearness
         return table.ravel()
-
-
-def _apart(one: ObjectView, other: ObjectView) -> float:
-    """The distance between two objects of a view along the floor, metres."""
-    angle = radians(one.bearing - other.bearing)
-    square = one.distance**2 + other.distance**2 - 2 * one.distance * other.distance * cos(angle)
-    return sqrt(max(square, 0.0))

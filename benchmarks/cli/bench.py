@@ -79,8 +79,8 @@ class BenchOptions(OptionGroup):
     agent: str = option(
         type=Words(),
         required=True,
-        help="The agent: oracle, random, searcher, mask-reader, zoo:NAME, rl:RUN, openai:MODEL, "
-        "package.module:Class …",
+        help="The agent: oracle, random, searcher, spotter, mask-reader, zoo:NAME, rl:RUN, "
+        "openai:MODEL, package.module:Class …",
     )
     out: Path | None = option(type=FOLDER, help="The run directory.  [default: runs/SUITE-AGENT]")
     limit: int | None = option(

@@ -93,9 +93,9 @@ class CollectOptions(OptionGroup):
         "refused ones.  [default: wrong, as in the paper]",
     )
     correct_by: CorrectBy | None = option(
-        type=click.Choice(("expert", "searcher")),
-        help="With --correct: which agent takes over. The searcher knows only what the failed "
-        "agent knew.  [default: expert]",
+        type=click.Choice(("expert", "searcher", "spotter")),
+        help="With --correct: which agent takes over. The searcher and the spotter know only what "
+        "the failed agent knew.  [default: expert]",
     )
     correct_steps: int | None = option(
         type=click.IntRange(min=1),

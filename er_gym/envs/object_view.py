@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import cos, radians, sqrt
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -91,6 +92,13 @@ def views_of_objects(
             )
         )
     return tuple(sorted(found, key=lambda each: (each.distance, each.object_id)))
+
+
+def apart(one: ObjectView, other: ObjectView) -> float:
+    """The distance between two objects of a view along the floor, metres."""
+    angle = radians(one.bearing - other.bearing)
+    square = one.distance**2 + other.distance**2 - 2 * one.distance * other.distance * cos(angle)
+    return sqrt(max(square, 0.0))
 
 
 def _state(objects: ObjectTable, state: str, ability: str, row: int) -> bool | None:

@@ -137,7 +137,7 @@ def test_other_wordings_are_understood_too(instruction: str, goals: list[Goal]) 
 
 @pytest.fixture(scope="module")
 def env() -> Iterable[EmbodiedEnv]:
-    env = EmbodiedEnv([], obs_mode="text", instances="explore")
+    env = EmbodiedEnv([], obs_mode="text+objects", instances="explore")
     yield env
     env.close()
 
@@ -145,16 +145,17 @@ def env() -> Iterable[EmbodiedEnv]:
 class Blinkered:
     """An agent from whom all is kept that only the environment should know."""
 
-    obs_mode = "text"
     told = frozenset(
         {
             *("visible_mask", "navigable_mask", "interactable_mask", "action_mask", "held"),
             *("action_success", "feedback", "steps", "max_steps"),
+            *("object_views", "object_views_around"),
         }
     )
 
-    def __init__(self) -> None:
-        self.agent = make_agent("searcher")
+    def __init__(self, name: str) -> None:
+        self.agent = make_agent(name)
+        self.obs_mode = self.agent.obs_mode
 
     def told_of(self, info: Mapping[str, Any]) -> dict[str, Any]:
         return {name: value for name, value in info.items() if name in self.told}
@@ -167,10 +168,13 @@ class Blinkered:
         return self.agent.act(obs, self.told_of(info))
 
 
-def test_it_has_no_privileged_knowledge_and_plays_the_same_again(env: EmbodiedEnv) -> None:
+@pytest.mark.parametrize("name", ["searcher", "spotter"])
+def test_it_has_no_privileged_knowledge_and_plays_the_same_again(
+    env: EmbodiedEnv, name: str
+) -> None:
     for task in load_suite("mini").tasks[::6]:
-        open_eyed = play_episode(env, make_agent("searcher", 1), task, 0)
-        blinkered = play_episode(env, Blinkered(), task, 0)
+        open_eyed = play_episode(env, make_agent(name, 1), task, 0)
+        blinkered = play_episode(env, Blinkered(name), task, 0)
         assert [step.text for step in open_eyed.steps] == [step.text for step in blinkered.steps]
         assert not blinkered.error
 
@@ -187,6 +191,43 @@ def test_it_solves_most_of_mini_without_breaking_rules(env: EmbodiedEnv) -> None
     steps = [step for record in records for step in record.steps]
     illegal = [step for step in steps if step.feedback.startswith("You cannot")]
     assert len(illegal) <= 0.02 * len(steps), [step.feedback for step in illegal[:5]]
+
+
+class Onlooker:
+    """Notes each time that a thing to be fetched is seen on a type of place that is not within
+    reach, and what the agent does then."""
+
+    def __init__(self, agent: Any) -> None:
+        self.agent, self.obs_mode = agent, "text+objects"
+        self.went: list[bool] = []
+
+    def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
+        self.thing = parse_instruction(task.instruction)[0].object_type
+        self.agent.reset(task, obs, info)
+
+    def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Any:
+        decided = self.agent.act(obs, info)
+        seen = next((one for one in info["object_views"] if one.object_type == self.thing), None)
+        places = {seen.on} & {*info["navigable"]} if seen else set()
+        if places and self.thing not in info["navigable"] and decided.action.verb != verbs.OBSERVE:
+            self.went.append(decided.action.object_type in places)
+        return decided
+
+
+def test_the_spotter_goes_to_where_it_sees_a_thing(env: EmbodiedEnv) -> None:
+    tasks = [task for task in load_suite("mini").tasks if task.type.name == "single_pickup"]
+    went: dict[str, list[bool]] = {}
+    steps: dict[str, int] = {}
+    for name in ("searcher", "spotter"):
+        went[name], steps[name] = [], 0
+        for task in tasks:
+            onlooker = Onlooker(make_agent(name))
+            steps[name] += len(play_episode(env, onlooker, task, 0).steps)
+            went[name] += onlooker.went[:1]  # later it may have been there already
+    assert len(went["spotter"]) > 2
+    assert all(went["spotter"])
+    assert not all(went["searcher"])
+    assert steps["spotter"] < steps["searcher"]
 
 
 def test_nonsense_ends_at_once(env: EmbodiedEnv) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from random import Random
+from typing import Literal
 
 import pytest
 from expert_courses import (
@@ -350,7 +351,10 @@ def test_a_correction_can_begin_after_a_failure(env: EmbodiedEnv) -> None:
     assert corrected
 
 
-def test_the_searcher_takes_over_a_failed_episode(env: EmbodiedEnv) -> None:
+@pytest.mark.parametrize("searcher", ["searcher", "spotter"])
+def test_a_searcher_takes_over_a_failed_episode(
+    env: EmbodiedEnv, searcher: Literal["searcher", "spotter"]
+) -> None:
     part = RECIPE.parts["corrections"]
     corrected = 0
     for candidate in of_each_type(part, 4):
@@ -358,7 +362,7 @@ def test_the_searcher_takes_over_a_failed_episode(env: EmbodiedEnv) -> None:
         beginning = first_mistake(failed.episode, "failure")
         if beginning.problem:
             continue
-        taken_over = replace(candidate, beginning=beginning, strength=None, correct_by="searcher")
+        taken_over = replace(candidate, beginning=beginning, strength=None, correct_by=searcher)
         one = play(env, taken_over)
         cut = len(beginning.actions)
         assert tuple(intent.action for intent in one.intents[:cut]) == beginning.actions
