@@ -22,6 +22,7 @@ from agents.zoo.index import CARD, FOLDER, MOST_BYTES, SUFFIXES, files_of, find_
 from benchmarks.cli.main import cli
 from er_gym.envs.actions import INDEX
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.info import with_details
 from er_gym.tasks import load_suite
 from er_gym.tasks.types import GROUPS
 
@@ -130,9 +131,9 @@ def test_a_policy_plays_at_once(name: str) -> None:
     task = next(each for each in load_suite("mini").tasks if each.type.name == "single_search")
     env = EmbodiedEnv((), obs_mode=agent.obs_mode, instances="explore", width=128, height=72)
     obs, info = env.reset(options={"task": task})
-    agent.reset(task, obs, info)
+    agent.reset(task, obs, with_details(env, info))
     for _ in range(3):
-        action = agent.act(obs, info).action
+        action = agent.act(obs, with_details(env, info)).action
         assert info["action_mask"][INDEX[action]]
         obs, _, ended, cut, info = env.step(action)
         if ended or cut:
