@@ -13,6 +13,9 @@ from agents.scripted.searcher.instruction import Goal, parse_instruction
 from benchmarks.scoring.metrics import score_episode
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.envs.info import with_details
+from er_gym.envs.object_view import ObjectView
+from er_gym.rollout.agent import Decision
 from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import BASIN_OF
@@ -228,6 +231,26 @@ def test_the_spotter_goes_to_where_it_sees_a_thing(env: EmbodiedEnv) -> None:
     assert all(went["spotter"])
     assert not all(went["searcher"])
     assert steps["spotter"] < steps["searcher"]
+
+
+def test_of_two_the_spotter_goes_to_the_nearer(env: EmbodiedEnv) -> None:
+    task = next(task for task in load_suite("mini").tasks if task.type.name == "single_pickup")
+    obs, told = env.reset(options={"task": task})
+    info = with_details(env, told)
+    thing = parse_instruction(task.instruction)[0].object_type
+    assert thing not in info["navigable"]
+    near, far = info["navigable"][:2]
+    for one, other in ((near, far), (far, near)):
+        views = tuple(
+            ObjectView(f"{thing}|{number}", thing, 0.0, 1.0 + number, on)
+            for number, on in enumerate((one, other))
+        )
+        agent = make_agent("spotter")
+        agent.reset(task, obs, info)
+        agent.act(obs, {**info, "object_views": views})  # looks about
+        second = agent.act(obs, {**info, "object_views": views})
+        assert isinstance(second, Decision)
+        assert str(second.action) == f"navigate to {one}"
 
 
 def test_nonsense_ends_at_once(env: EmbodiedEnv) -> None:

@@ -356,7 +356,7 @@ def test_a_searcher_takes_over_a_failed_episode(
     env: EmbodiedEnv, searcher: Literal["searcher", "spotter"]
 ) -> None:
     part = RECIPE.parts["corrections"]
-    corrected = 0
+    corrected, as_the_searcher = 0, searcher == "spotter"
     for candidate in of_each_type(part, 4):
         failed = play(env, candidate)
         beginning = first_mistake(failed.episode, "failure")
@@ -364,6 +364,9 @@ def test_a_searcher_takes_over_a_failed_episode(
             continue
         taken_over = replace(candidate, beginning=beginning, strength=None, correct_by=searcher)
         one = play(env, taken_over)
+        if as_the_searcher:
+            other = play(env, replace(taken_over, correct_by="searcher"))
+            as_the_searcher = one.intents == other.intents
         cut = len(beginning.actions)
         assert tuple(intent.action for intent in one.intents[:cut]) == beginning.actions
         assert not any(intent.train for intent in one.intents[:cut])
@@ -377,6 +380,7 @@ def test_a_searcher_takes_over_a_failed_episode(
         assert one.episode.success
         corrected += 1
     assert corrected > 8
+    assert not as_the_searcher
 
 
 def test_the_searcher_leaves_alone_what_is_done(env: EmbodiedEnv) -> None:
