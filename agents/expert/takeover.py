@@ -1,4 +1,4 @@
-"""The searcher takes over a failed episode: it knows what was seen, and does the rest."""
+"""A searcher takes over a failed episode: it knows what was seen, and does the rest."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ class RLAgent:
         config = load_config(file.parent / CONFIG)
         self._policy = _loaded(file, file.stat().st_mtime_ns)
         self._policy_observation = PolicyObservation(config.env)
-        self.obs_mode: str = config.env.needed
+        self.obs_mode: str = config.env.needed_obs_mode
 
     def reset(self, task: Task, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """Begin an episode.

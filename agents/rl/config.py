@@ -82,7 +82,7 @@ class EnvConfig(StrictSettings):
         return self
 
     @property
-    def needed(self) -> str:
+    def needed_obs_mode(self) -> str:
         """The observations that the environment must give, as its ``obs_mode``."""
         return f"{self.obs_mode}+objects" if self.sightings else self.obs_mode
 

@@ -133,7 +133,7 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         self._started_at = position and self._positions.get(info["task_type"], position)
         info |= {"seen": obs, "started_at": self._started_at}
         observation = self.policy_observation
-        told = observation.told(self, info)
+        told = observation.info_of(self, info)
         if moment is None:
             return observation.reset(obs, told, info["instruction"]), info
         observation.recall(moment.memory)
@@ -157,7 +157,7 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         """Do an action."""
         obs, reward, terminated, truncated, info = self.env.step(action)
         info |= {"seen": obs, "started_at": self._started_at}
-        seen = self.policy_observation.observe(obs, self.policy_observation.told(self, info))
+        seen = self.policy_observation.observe(obs, self.policy_observation.info_of(self, info))
         return seen, reward, terminated, truncated, info
 
     def action_masks(self) -> NDArray[np.int8]:
@@ -236,7 +236,7 @@ def make_env(
     """
     member = MemberEnv(
         (),
-        obs_mode=f"{options.needed}+text" if with_text else options.needed,
+        obs_mode=f"{options.needed_obs_mode}+text" if with_text else options.needed_obs_mode,
         width=options.width,
         height=options.height,
         instances=options.instances,

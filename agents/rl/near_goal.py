@@ -78,7 +78,7 @@ class _Watched:
 
     def begin(self, task: Task) -> tuple[Any, dict[str, Any]]:
         obs, info = self._env.reset(options={"task": task})
-        told = self._observation.told(self._env, info)
+        told = self._observation.info_of(self._env, info)
         self._observation.reset(obs, told, info["instruction"])
         self._left = info["key_actions_left"]
         return obs, info
@@ -90,7 +90,7 @@ class _Watched:
         if left < self._left and not over:
             self.moments.append(Moment(left, self._env.snapshot(), memory))
             self._left = left
-        self._observation.observe(obs, self._observation.told(self._env, info))
+        self._observation.observe(obs, self._observation.info_of(self._env, info))
         return obs, reward, terminated, truncated, info
 
 

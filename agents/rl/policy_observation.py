@@ -83,12 +83,12 @@ class PolicyObservation:
         self._told = self._encode(instruction) if self._encode is not None else None
         return self.observe(obs, info)
 
-    def told(self, env: Any, info: Mapping[str, Any]) -> Mapping[str, Any]:
+    def info_of(self, env: Any, info: Mapping[str, Any]) -> Mapping[str, Any]:
         """``info`` with what else of a step of ``env`` is observed."""
         return with_details(env, info) if self._with_sightings else info
 
     def observe(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Obs:
-        """The next one; for sightings, ``info`` has details (:meth:`told`)."""
+        """The next one; for sightings, ``info`` has details (:meth:`info_of`)."""
         made: Obs = {"state": obs["state"]}
         if self.subtasks is not None:
             made["subtask"] = self.subtasks.update(info)

@@ -3,8 +3,8 @@ objects of each type there are.
 
 ``state`` and ``subtask`` tell by type what is in view, and what was in view where the agent stood.
 Neither tells that a mug stands on the table over there, nor that two of five drawers are still
-closed. Both follow from the objects in view (:class:`er_gym.envs.object_view.ObjectView`): an agent
-that sees them also tells one object from another of its type.
+closed. Both follow from the objects in view (:class:`er_gym.envs.object_view.ObjectView`). Objects
+of a type are told apart by their ids, as by an agent that never mistakes one for another.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from er_gym.envs.info import detail
 from er_gym.envs.object_view import ObjectView, apart
 from er_gym.thor.objects import KIND_OF, TYPES
 
-ROLES = ("thing", "place")
+_ROLES = ("thing", "place")
 SIGHTING_FEATURES = (
-    *(f"{role} {where}" for role in ROLES for where in ("on it", "near it")),
+    *(f"{role} {where}" for role in _ROLES for where in ("on it", "near it")),
     *("number", "closed", "nearness"),
 )
 """The features of each object type in ``sightings``, from 0 to 1:
 
-- ``thing on it``, ``place on it``: the thing of the subtask at hand, or its place, lay in or on one
-  of this type when it was in view last: 1 if it is in view now;
+- ``thing on it``, ``place on it``: the thing of the subtask at hand, or its place (to slice, the
+  knife), lay in or on one of this type when it was in view last: 1 if it is in view now;
 - ``thing near it``, ``place near it``: how near to one of this type it was then: 1 at no distance,
   1/e at one metre; less if it is not in view now;
 - ``number``: how many different objects of the type the agent has seen in the episode; ``closed``:
@@ -44,7 +44,7 @@ _REMEMBERED = 0.7
 """What a sighting is worth once the thing is out of view."""
 
 
-class _Sighting(NamedTuple):
+class _LastSeen(NamedTuple):
     """A type when it was in view last: on which type it lay, and how near to which."""
 
     on: int | None
@@ -62,7 +62,7 @@ class SightingMemory:
         self._progress = progress
         names = {name for each in progress.subtasks for name in (each.thing, each.place)}
         self._named = names & KIND_OF.keys()
-        self._sightings: dict[str, _Sighting] = {}
+        self._sightings: dict[str, _LastSeen] = {}
         self._closed: dict[int, dict[str, bool]] = {}  # by type and object: closed when last seen
 
     def update(self, info: Mapping[str, Any]) -> NDArray[np.float32]:
@@ -87,7 +87,7 @@ class SightingMemory:
                 in_view.add(name)
         return self._vector(ahead, in_view)
 
-    def _sighted(self, views: Sequence[ObjectView]) -> Iterator[tuple[str, _Sighting]]:
+    def _sighted(self, views: Sequence[ObjectView]) -> Iterator[tuple[str, _LastSeen]]:
         """The named types among the objects of one view, which has the nearest first."""
         found = set[str]()
         for view in views:
@@ -100,7 +100,7 @@ class SightingMemory:
                 kind = KIND_OF[other.object_type]
                 if other is not view:
                     near[kind] = max(near.get(kind, 0.0), exp(-apart(view, other)))
-            yield name, _Sighting(KIND_OF.get(view.on), near)
+            yield name, _LastSeen(KIND_OF.get(view.on), near)
 
     def _vector(self, ahead: Sequence[ObjectView], in_view: set[str]) -> NDArray[np.float32]:
         table = np.zeros((len(SIGHTING_FEATURES), len(TYPES)), np.float32)
@@ -111,7 +111,7 @@ class SightingMemory:
             table[_ROW["nearness"], KIND_OF[view.object_type]] = 1.0 / (1.0 + view.distance)
         now = self._progress.at()
         if now is not None:
-            for role, name in zip(ROLES, (now.thing, now.place), strict=True):
+            for role, name in zip(_ROLES, (now.thing, now.place), strict=True):
                 sighting = self._sightings.get(name)
                 if sighting is None:
                     continue

@@ -39,7 +39,7 @@ class SpotterAgent(SearcherAgent):
         """Note what came of the last action, and what is in view, with what else is."""
         super()._take_result(info)
         for views in (*detail(info, "object_views_around").values(), detail(info, "object_views")):
-            for each in reversed(views):  # the nearest of a type comes last and stays
+            for each in reversed(views):  # the nearest of a type in a view comes last and stays
                 self._seen[each.object_type] = each, views
         self._seen.pop(info["held"], None)
 
