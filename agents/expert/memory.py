@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from agents.expert.course import View
 from er_gym.data.claims import PARTS
-from er_gym.envs.object_view import ObjectView, apart
+from er_gym.envs.object_view import ObjectView, nearest_to
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import is_among, same_type
 
@@ -88,9 +88,3 @@ class Remembering:
     def view(self, view: View) -> None:
         self._view = view
         self._memory.take(view)
-
-
-def nearest_to(goal: ObjectView, views: Iterable[ObjectView]) -> tuple[str, ...]:
-    """The types of the objects in view, those nearest to an object in view first."""
-    nearest = sorted(views, key=lambda view: apart(goal, view))
-    return tuple(dict.fromkeys(view.object_type for view in nearest))

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.rl.subtask_memory import logarithm
+from agents.rl.subtask_memory import logarithms
 from agents.rl.subtasks import Progress
 from er_gym.envs.info import detail
 from er_gym.envs.object_view import ObjectView, apart
@@ -63,7 +63,8 @@ class SightingMemory:
         names = {name for each in progress.subtasks for name in (each.thing, each.place)}
         self._named = names & KIND_OF.keys()
         self._sightings: dict[str, _LastSeen] = {}
-        self._closed: dict[int, dict[str, bool]] = {}  # by type and object: closed when last seen
+        self._closed: dict[str, bool] = {}  # by object: whether it was closed when last seen
+        self._counts = np.zeros((2, len(TYPES)), np.intp)  # of each type: all, and the closed
 
     def update(self, info: Mapping[str, Any]) -> NDArray[np.float32]:
         """Take in what is in view after a step.
@@ -80,12 +81,20 @@ class SightingMemory:
         in_view = set[str]()
         for views in (*detail(info, "object_views_around").values(), ahead):
             for view in views:
-                objects = self._closed.setdefault(KIND_OF[view.object_type], {})
-                objects[view.object_id] = view.is_open is False
+                self._count(view)
             for name, sighting in self._sighted(views):
                 self._sightings[name] = sighting
                 in_view.add(name)
         return self._vector(ahead, in_view)
+
+    def _count(self, view: ObjectView) -> None:
+        """Count an object that is in view, once in the episode."""
+        closed = view.is_open is False
+        before = self._closed.get(view.object_id)
+        if before != closed:
+            kind = KIND_OF[view.object_type]
+            self._counts[:, kind] += (before is None, closed - bool(before))
+            self._closed[view.object_id] = closed
 
     def _sighted(self, views: Sequence[ObjectView]) -> Iterator[tuple[str, _LastSeen]]:
         """The named types among the objects of one view, which has the nearest first."""
@@ -104,9 +113,7 @@ class SightingMemory:
 
     def _vector(self, ahead: Sequence[ObjectView], in_view: set[str]) -> NDArray[np.float32]:
         table = np.zeros((len(SIGHTING_FEATURES), len(TYPES)), np.float32)
-        for kind, objects in self._closed.items():
-            table[_ROW["number"], kind] = logarithm(len(objects))
-            table[_ROW["closed"], kind] = logarithm(sum(objects.values()))
+        table[[_ROW["number"], _ROW["closed"]]] = logarithms(self._counts)
         for view in reversed(ahead):  # the nearest is written last
             table[_ROW["nearness"], KIND_OF[view.object_type]] = 1.0 / (1.0 + view.distance)
         now = self._progress.at()

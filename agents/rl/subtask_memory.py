@@ -80,16 +80,15 @@ _FITS = {
 }
 
 
-def logarithm(count: int) -> float:
-    """From 0 to 1, which is for twenty and more."""
+def _logarithm(count: int) -> float:
     return min(1.0, log1p(count) / log1p(_MOST))
 
 
-_LOGARITHMS = np.array([logarithm(count) for count in range(_MOST + 1)], np.float32)
+_LOGARITHMS = np.array([_logarithm(count) for count in range(_MOST + 1)], np.float32)
 
 
-def _logarithms(counts: NDArray[np.intp]) -> NDArray[np.float32]:
-    """(T,) from 0 to 1."""
+def logarithms(counts: NDArray[np.intp]) -> NDArray[np.float32]:
+    """Of the same shape, from 0 to 1, which is for twenty and more."""
     return np.asarray(_LOGARITHMS[np.minimum(counts, _MOST)])
 
 
@@ -182,7 +181,7 @@ class SubtaskMemory:
             ("all done", float(now is None)),
             ("left", min(left / 8, 1.0)),
             ("moved on", float(self.moved_on)),
-            ("since", logarithm(self._since)),
+            ("since", _logarithm(self._since)),
             ("observed", min(self.observed / 3, 1.0)),
             ("observed ever", float(self._observed_ever)),
             ("steps left", min(max(info["max_steps"] - info["steps"], 0) / _LONGEST, 1.0)),
@@ -190,9 +189,9 @@ class SubtaskMemory:
         ):
             vector[_PLACE[name]] = value
         table = vector[len(SUBTASK_SCALARS) :].reshape(len(SUBTASK_FEATURES), len(TYPES))
-        table[_ROW["tried"]] = _logarithms(self.tried)
-        table[_ROW["visits"]] = _logarithms(self._visits)
-        table[_ROW["opens"]] = _logarithms(self._opens)
+        table[_ROW["tried"]] = logarithms(self.tried)
+        table[_ROW["visits"]] = logarithms(self._visits)
+        table[_ROW["opens"]] = logarithms(self._opens)
         table[_ROW["opened now"]] = self._opened_now
         table[_ROW["opened before"]] = self._opened_before
         table[_ROW["same sight"]] = self._same_sight

@@ -7,7 +7,7 @@ object in view.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import cos, radians, sqrt
 from typing import Literal, TypeAlias
@@ -99,6 +99,13 @@ def apart(one: ObjectView, other: ObjectView) -> float:
     angle = radians(one.bearing - other.bearing)
     square = one.distance**2 + other.distance**2 - 2 * one.distance * other.distance * cos(angle)
     return sqrt(max(square, 0.0))
+
+
+def nearest_to(goal: ObjectView, views: Iterable[ObjectView]) -> tuple[str, ...]:
+    """The types of the objects of a view, those nearest to one of its objects first; that one's own
+    type is the first."""
+    nearest = sorted(views, key=lambda view: apart(goal, view))
+    return tuple(dict.fromkeys(view.object_type for view in nearest))
 
 
 def _state(objects: ObjectTable, state: str, ability: str, row: int) -> bool | None:

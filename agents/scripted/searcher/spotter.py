@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from itertools import islice
 from typing import Any
 
 from agents.scripted.searcher import search_priors
 from agents.scripted.searcher.agent import SearcherAgent
 from er_gym.envs.actions import Action
 from er_gym.envs.info import detail
-from er_gym.envs.object_view import ObjectView, apart
+from er_gym.envs.object_view import ObjectView, nearest_to
 from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
 
 _NEIGHBOURS = 2
-"""Of how many types near a thing it tries to go to one, where it cannot go to what holds it."""
+"""How many types near a thing it goes to, where it cannot go to what holds the thing."""
 
 
 class SpotterAgent(SearcherAgent):
@@ -57,6 +58,5 @@ class SpotterAgent(SearcherAgent):
         """The types to go to for a thing, the best first."""
         if seen.on in self._view.navigable:
             return (seen.on,)
-        nearest = sorted(views, key=lambda other: apart(seen, other))
-        names = dict.fromkeys(other.object_type for other in nearest if other is not seen)
-        return [name for name in names if name in self._view.navigable][:_NEIGHBOURS]
+        near = (name for name in nearest_to(seen, views) if name in self._view.navigable)
+        return tuple(islice(near, _NEIGHBOURS))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from math import exp, log1p
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from gymnasium import spaces
 from pydantic import ValidationError
 from untrained_policy import write_untrained_run
 
-from agents.rl.agent import RLAgent
+from agents.rl.agent import GreedyPolicy, RLAgent
 from agents.rl.anchored import starting_network
 from agents.rl.config import EnvConfig, how_learnt
 from agents.rl.envs import make_env
@@ -111,7 +112,7 @@ def test_in_a_room_it_is_what_the_views_say() -> None:
     space = env.observation_space["sightings"]
     assert isinstance(space, spaces.Box)
     assert space.shape == (len(SIGHTING_LAYOUT),)
-    random, checked = np.random.default_rng(0), 0
+    random, checked = np.random.default_rng(0), Counter[bool]()
     env.reset(seed=5)
     for _ in range(8):
         obs, info = env.reset()
@@ -119,16 +120,22 @@ def test_in_a_room_it_is_what_the_views_say() -> None:
             assert space.contains(obs["sightings"])
             told = with_details(env, info)
             now = env.policy_observation.subtasks.progress.at()
-            in_view = [one for one in told["object_views"] if now and one.object_type == now.thing]
+            views = [told["object_views"], *[*told["object_views_around"].values()][::-1]]
+            in_view = [
+                one for each in views for one in each if now and one.object_type == now.thing
+            ]
             if in_view and in_view[0].on:
                 on = marked(obs["sightings"], "thing on it")
                 assert on == {in_view[0].on: 1.0}
-                checked += 1
+                checked[in_view[0] in views[0]] += 1
             place = str(random.choice(names(info["navigable_mask"])))
-            obs, _, over, _, info = env.step(INDEX[Action(verbs.NAVIGATE, place)])
+            looks = random.random() < 0.25
+            action = Action(verbs.OBSERVE) if looks else Action(verbs.NAVIGATE, place)
+            obs, _, over, _, info = env.step(INDEX[action])
             if over:
                 break
-    assert checked > 10
+    assert checked[True] > 10  # ahead
+    assert checked[False] > 1  # about it
     env.close()
 
 
@@ -173,17 +180,18 @@ def test_a_policy_begins_to_see(make_config: Any, blind: Path) -> None:
 def test_an_agent_that_sees_plays(make_config: Any, tmp_path: Path) -> None:
     env = {"episodes": "mini", "types": ["single_pickup"], "subtasks": True, "sightings": True}
     write_untrained_run(make_config(env=env), tmp_path / "run")
-    agent = RLAgent(tmp_path / "run")
+    agent, policy = RLAgent(tmp_path / "run"), GreedyPolicy.load(tmp_path / "run" / MODEL)
     assert agent.obs_mode == "state+objects"
     room: Any = make_env(EnvConfig.model_validate(env))
-    _, info = room.reset(seed=2)
+    seen, info = room.reset(seed=2)
     agent.reset(room.unwrapped.task, info["seen"], with_details(room, info))
     over, steps = False, 0
     while not over:
         decided = agent.act(info["seen"], with_details(room, info))
         number = INDEX[decided.action]  # type: ignore[index]
-        assert info["action_mask"][number]
-        _, _, over, _, info = room.step(number)
+        assert number == policy.best(seen, info["action_mask"])  # as in training
+        assert seen["sightings"].any()
+        seen, _, over, _, info = room.step(number)
         steps += 1
     assert steps > 1
     room.close()
