@@ -187,7 +187,7 @@ class VLMAgent:
         assert self._task is not None
         before, now = self._perceived, None
         if self._prompts.as_recorded and self._settings.sees == "text":
-            now = self._perceived = Perceived.of(info)
+            now = self._perceived = Perceived.of(info, before)
         turn = TurnContext(
             task=self._task.instruction,
             decide=self._settings.decide,

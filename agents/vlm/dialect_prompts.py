@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
+from typing import Any
 
 from agents.vlm.prompt_set import (
     IMAGE_MARK,
@@ -90,8 +91,13 @@ def dialect_prompts(dialect: str, language: Language) -> DialectPrompts:
     texts = loaded.texts_in(language)
     # Not what a prompt does not depend on, nor what older versions did not have, so that older
     # runs can be continued.
-    left_out = {"frames", *(("scene_by",) if texts.scene_by == "user" else ())}
-    left_out |= {"named"} if texts.named is None else set()
+    left_out: dict[str, Any] = {"frames": True}
+    left_out |= {"scene_by": True} if texts.scene_by == "user" else {}
+    left_out |= {name: True for name in ("named", "places") if getattr(texts, name) is None}
+    for name, words in (("named", ("seen", "far")), ("notes", ("at",))):
+        told = getattr(texts, name)
+        if told is not None and not any(getattr(told, word) for word in words):
+            left_out[name] = {*words}
     digest = hashlib.sha256(texts.model_dump_json(exclude=left_out).encode())
     if verbs.ADDED:
         digest.update(repr(verbs.ADDED).encode())

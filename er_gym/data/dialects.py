@@ -22,6 +22,7 @@ from er_gym.data.chat import Chat, ChatTurn, Shown, joined
 from er_gym.data.knowledge import AROUND
 from er_gym.data.mentions import named_in
 from er_gym.data.notes import NoteWords, note
+from er_gym.data.recall import PlaceWords, places_text
 from er_gym.data.scene_text import (
     FrameWords,
     NamedWords,
@@ -87,6 +88,8 @@ class DialectTexts(BaseModel):
         scene: the words for what the agent perceives; None if nobody tells it.
         named: the words for how far the things are that the instruction names, told after the
             scene by the user; None if nobody tells it.
+        places: the words for the places that the agent can go to and has been, told after that by
+            the user; None if nobody tells it.
         scene_by: who tells it: ``user``: the user, in place of pictures; ``assistant``: the
             assistant, as its first thought about each new picture, before its note.
         notes: the words of ``notes``.
@@ -113,6 +116,7 @@ class DialectTexts(BaseModel):
     closers: list[str] = []
     scene: SceneWords | None = None
     named: NamedWords | None = None
+    places: PlaceWords | None = None
     scene_by: Literal["user", "assistant"] = "user"
     notes: NoteWords | None = None
     frames: FrameWords | None = None
@@ -146,8 +150,9 @@ class DialectTexts(BaseModel):
                 raise ValueError(f"give openers of {without}" if without else "give closers")
         if self.thoughts == "notes" and self.notes is None:
             raise ValueError("thoughts are notes, but there are no words for them; give notes")
-        if self.named is not None and self.sees != "text":
-            raise ValueError("named goes with a scene that the user tells; leave it out")
+        for name in ("named", "places"):
+            if getattr(self, name) is not None and self.sees != "text":
+                raise ValueError(f"{name} goes with a scene that the user tells; leave it out")
         if self.scene_by == "assistant" and (self.scene is None or self.thoughts != "notes"):
             raise ValueError("scene_by is assistant; give scene, and set thoughts to notes")
         return self
@@ -208,7 +213,7 @@ class Dialect:
         before: Perceived | None = None
         last: ActionResult | None = None
         for index, turn in enumerate(trajectory.turns):
-            now = Perceived.at(turn)
+            now = Perceived.at(turn, trajectory.turns[index - 1] if index else None, before)
             pictures = [(each.direction, each) for each in turn.pictures]
             told = user_turn(texts, trajectory.instruction, last, pictures, now, before)
             turns.append(ChatTurn("user", told))
@@ -322,6 +327,8 @@ def user_turn(
     lines = [told_scene(texts, now, before, last)]
     if texts.named is not None and now is not None:
         lines.append(named_text(texts.named, named_in(instruction), now))
+    if texts.places is not None and now is not None:
+        lines.append(places_text(texts.places, now.navigable, now.recalled))
     values["scene"] = "\n".join(filter(None, lines))
     around = [*now.views] if now else []
     told = _filled(getattr(texts, _text_for(last, around)).strip(), values)

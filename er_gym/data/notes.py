@@ -29,8 +29,11 @@ class NoteWords(BaseModel):
         goal: the goal, with ``{verb}`` and ``{thing}``; ``to``: the destination, ``{place}``.
         held, near, view, seen, unseen: where the wanted object ``{thing}`` is: in the hand, within
             reach, in view, seen before, never seen.
-        looked: the places searched for it, ``{places}``; ``times``: how a place is named that was
-            searched more than once, with ``{place}`` and ``{count}``.
+        at: for a thing in view or seen before that lies or lay in or on another, ``{place}``;
+            ``""`` where notes do not tell that.
+        looked: the places searched for it, ``{places}``; ``""`` where notes do not tell them;
+            ``times``: how a place is named that was searched more than once, with ``{place}`` and
+            ``{count}``.
         again: that the last ``{count}`` actions, two or more, were all ``{action}``; ``""`` where
             notes do not count that.
         next: the places to search next, ``{places}``.
@@ -49,6 +52,7 @@ class NoteWords(BaseModel):
     view: str
     seen: str
     unseen: str
+    at: str = ""
     looked: str
     times: str
     again: str = ""
@@ -86,14 +90,18 @@ def note(words: NoteWords, trajectory: Trajectory, index: int) -> tuple[ThoughtK
         wanted = subgoal.thing
         if subgoal.place and known.held == subgoal.thing:
             wanted = subgoal.place
-        parts += [goal, getattr(words, _how_far(known, wanted)).replace("{thing}", wanted)]
+        how_far = _how_far(known, wanted)
+        told = getattr(words, how_far).replace("{thing}", wanted)
+        if how_far in ("view", "seen") and (place := known.where(wanted)):
+            told += words.at.replace("{place}", place)
+        parts += [goal, told]
     looked = [
         place
         if count == 1
         else words.times.replace("{place}", place).replace("{count}", str(count))
         for place, count in _looked(trajectory.turns[:index], known).items()
     ]
-    if looked:
+    if looked and words.looked:
         parts.append(words.looked.replace("{places}", words.places_separator.join(looked)))
     count = _in_a_row(known.actions)
     if words.again and count > 1:

@@ -12,8 +12,9 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
+from er_gym.data.recall import Recalled, where_each_lies
 from er_gym.data.trajectory import SeenObject, Turn
-from er_gym.envs.info import detail
+from er_gym.envs.info import action_of, detail
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,7 @@ class Perceived:
 
     Attributes:
         view, views, held, navigable, interactable: see there.
+        recalled: what it remembers of the episode up to here.
     """
 
     view: Sequence[SeenObject] = ()
@@ -29,16 +31,31 @@ class Perceived:
     held: str = ""
     navigable: Sequence[str] = ()
     interactable: Sequence[str] = ()
+    recalled: Recalled = field(default_factory=Recalled)
 
     @classmethod
-    def at(cls, turn: Turn) -> Perceived:
-        """What was perceived at a turn of a trajectory."""
-        return cls(turn.view, turn.views, turn.held, turn.navigable, turn.interactable)
+    def at(cls, turn: Turn, last: Turn | None = None, before: Perceived | None = None) -> Perceived:
+        """What was perceived at a turn of a trajectory.
+
+        Args:
+            turn: the turn.
+            last, before: the turn before it, and what was perceived there; None at first.
+        """
+        now = cls(turn.view, turn.views, turn.held, turn.navigable, turn.interactable)
+        if before is None or last is None:
+            return now._remembering(Recalled())
+        done = before.recalled.having_done(last.action, last.success, before.held)
+        return now._remembering(done)
 
     @classmethod
-    def of(cls, info: Mapping[str, Any]) -> Perceived:
-        """What an environment with the observation ``objects`` says: ``info`` with details."""
-        return cls(
+    def of(cls, info: Mapping[str, Any], before: Perceived | None = None) -> Perceived:
+        """What an environment with the observation ``objects`` says.
+
+        Args:
+            info: with details.
+            before: what was perceived before the last action; None at first.
+        """
+        now = cls(
             [SeenObject.of(each) for each in detail(info, "object_views")],
             {
                 direction: [SeenObject.of(each) for each in views]
@@ -48,6 +65,19 @@ class Perceived:
             list(info["navigable"]),
             list(info["interactable"]),
         )
+        if before is None:
+            return now._remembering(Recalled())
+        success = bool(info["action_success"])
+        return now._remembering(before.recalled.having_done(action_of(info), success, before.held))
+
+    def _remembering(self, recalled: Recalled) -> Perceived:
+        """The same, with what was remembered before and what is seen now."""
+        return replace(self, recalled=recalled.having_seen(self.view, self.around))
+
+    @property
+    def around(self) -> Sequence[SeenObject]:
+        """The objects of all views around."""
+        return [one for view in self.views.values() for one in view]
 
 
 class SceneWords(BaseModel):
@@ -56,7 +86,7 @@ class SceneWords(BaseModel):
     Attributes:
         view: lists the objects in view, ``{things}``; ``around``: those seen by looking around, of
             which none is within reach; ``other``: the types, not listed otherwise, that the agent
-            can navigate to from now on.
+            can navigate to from now on; ``""`` if they are not told.
         held: states the object in the hand, ``{things}``.
         same: used after an action that changed nothing of this. ``nothing``: used if no object is
             in view.
@@ -90,7 +120,10 @@ class NamedWords(BaseModel):
     Attributes:
         told: lists them, ``{things}``.
         held, near, view, hidden: in the hand, within reach, in view, and not in view.
-        at: for an object in view that lies in or on another, ``{place}``.
+        seen: out of view, but seen before; ``""`` if that is told as ``hidden``.
+        at: for an object in view, or seen, that lies or lay in or on another, ``{place}``.
+        far: for an object in view, or seen, that the agent cannot navigate to; ``""`` if that is
+            not told.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -101,6 +134,8 @@ class NamedWords(BaseModel):
     view: str
     hidden: str
     at: str
+    seen: str = ""
+    far: str = ""
 
 
 class FrameWords(BaseModel):
@@ -159,17 +194,18 @@ def scene_text(words: SceneWords, now: Perceived, before: Perceived | None, *, s
         elif not seen:
             lines.append(words.view.replace("{things}", words.nothing))
     elsewhere = replace(now, interactable=now.navigable)  # nothing there is within reach
-    sides = (each for view in now.views.values() for each in view)
     ahead = {(each.type, each.holder) for each in seen}
     around = [
-        each for each in _things(words, sides, elsewhere) if (each.type, each.holder) not in ahead
+        each
+        for each in _things(words, now.around, elsewhere)
+        if (each.type, each.holder) not in ahead
     ]
     if around:
         lines.append(words.around.replace("{things}", _listed(words, around)))
     shown = {each.type for each in (*told, *around)}
     before_known = set() if before is None else {*before.navigable}
     others = [each for each in now.navigable if each not in before_known | shown]
-    if others:
+    if others and words.other:
         lines.append(words.other.replace("{things}", ", ".join(others)))
     if now.held and (lines or before is None or now.held != before.held):
         lines.append(words.held.replace("{things}", now.held))
@@ -178,19 +214,20 @@ def scene_text(words: SceneWords, now: Perceived, before: Perceived | None, *, s
 
 def named_text(words: NamedWords, named: Sequence[str], now: Perceived) -> str:
     """Where objects of some types are, in one line; ``""`` if no type is given."""
-    nearest: dict[str, SeenObject] = {}
-    for each in (*now.view, *(one for view in now.views.values() for one in view)):
-        nearest.setdefault(each.type, each)
+    in_view = where_each_lies(now.view, now.around)
+    lay = {**now.recalled.lay, **in_view}
 
     def how_far(name: str) -> str:
         if name == now.held:
             return words.held
         if name in now.interactable:
             return words.near
-        if name not in nearest:
+        if name not in in_view and not (words.seen and name in lay):
             return words.hidden
-        place = nearest[name].on
-        return words.view + (words.at.replace("{place}", place) if place else "")
+        told = words.view if name in in_view else words.seen
+        if words.far and name not in now.navigable:
+            told += f" {words.far}"
+        return told + (words.at.replace("{place}", lay[name]) if lay[name] else "")
 
     told = ", ".join(f"{name} {how_far(name)}" for name in named)
     return words.told.replace("{things}", told) if told else ""

@@ -74,8 +74,8 @@ class Conversation:
         self.success, self.done = bool(info["success"]), terminated or truncated
         said = info["action"] or action or _NO_ACTION
         last = ActionResult(said, bool(info["action_success"]), info["feedback"])
-        now, before = Perceived.of(with_details(self._env, info)), self._perceived
-        self._perceived = now
+        before = self._perceived
+        now = self._perceived = Perceived.of(with_details(self._env, info), before)
         if not info["verb"]:  # no action: nothing was done, and nothing is told of the room
             told = user_turn(self._texts, "", last, ())
         else:

@@ -155,7 +155,7 @@ def as_trained(chat: Chat, files: Mapping[str, bytes]) -> list[Any]:
     ]
 
 
-@pytest.mark.parametrize("dialect", ["paper", "sight", "tags", "text"])
+@pytest.mark.parametrize("dialect", ["paper", "sight", "tags", "text", "text-recall"])
 def test_a_model_is_told_what_it_was_tuned_on(
     dialect: str, env: Callable[..., EmbodiedEnv], played: list[Played]
 ) -> None:

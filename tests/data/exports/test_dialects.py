@@ -242,7 +242,7 @@ def test_turns_that_are_not_learnt_can_be_told_by_the_user(trajectories: list[Tr
 
 
 def test_unknown_and_damaged_dialects_say_what_there_is(tmp_path: Path) -> None:
-    names = "paper, sight, tags, text, text-actions"
+    names = "paper, sight, tags, text, text-actions, text-recall"
     with pytest.raises(ValueError, match=f"choose one of: {names}; or give a folder"):
         load_dialect("pirate")
     own = (Path(__file__).parents[3] / "configs/dialects/paper/en.yaml").read_text()
@@ -302,7 +302,9 @@ def test_the_user_tells_how_far_the_things_are_that_the_instruction_names() -> N
     )
     (told,) = user_turn(texts, "Look around.", None, [], now, None)
     assert "asked" not in str(told)
-    with pytest.raises(ValueError, match="named goes with a scene that the user tells"):
-        texts.model_validate(
-            {**load_dialect("sight").texts["en"].model_dump(), "named": texts.named}
-        )
+    more = load_dialect("text-recall").texts["en"]
+    for name in ("named", "places"):
+        with pytest.raises(ValueError, match=f"{name} goes with a scene that the user tells"):
+            texts.model_validate(
+                {**load_dialect("sight").texts["en"].model_dump(), name: getattr(more, name)}
+            )

@@ -1,0 +1,104 @@
+"""What an agent remembers of an episode, and how the dialect ``text-recall`` tells it."""
+
+from __future__ import annotations
+
+from er_gym.data.dialects import load_dialect, user_turn
+from er_gym.data.notes import note
+from er_gym.data.recall import Recalled
+from er_gym.data.scene_text import Perceived
+from er_gym.data.trajectory import SeenObject, Subgoal, Trajectory, Turn
+from er_gym.envs.actions import Action
+from er_gym.tasks import verbs
+
+TEXTS = load_dialect("text-recall").texts["en"]
+TASK = "Put the Mug in the Box, and the Pen on the Desk."
+GO, PUT = verbs.NAVIGATE, verbs.PUT
+
+
+def sees(kind: str, on: str = "") -> SeenObject:
+    return SeenObject(type=kind, side="ahead", distance=1.0, on=on)
+
+
+def turn(verb: str, kind: str = "", success: bool = True, **fields: object) -> Turn:
+    goal = Subgoal(verb=verbs.PICKUP, thing="Mug", place="Box")
+    return Turn.model_validate(
+        {"purpose": "search", "subgoal": goal, "verb": verb, "object_type": kind}
+        | {"success": success, **fields}
+    )
+
+
+KNOWN = ["Box", "Desk", "Drawer", "Mirror", "Plate"]
+TURNS = [
+    turn(verbs.OBSERVE, view=[sees("Mug", "Shelf"), sees("Drawer")], navigable=KNOWN),
+    turn(
+        GO, "Drawer", navigable=KNOWN, view=[sees("Mug", "Shelf"), sees("Mug", "Bed")],
+        views={"left": [sees("Drawer"), sees("Drawer")], "right": [sees("Drawer"), sees("Pen")]},
+    ),
+    turn(GO, "Desk", False, view=[sees("Drawer")], navigable=KNOWN),
+    turn(GO, "Drawer", navigable=KNOWN),
+    turn(GO, "Desk", navigable=["Desk", "Mug"], held="Mug"),
+    turn(PUT, "Desk", navigable=["Desk", "Mug"], interactable=["Desk"], held="Mug"),
+    turn(verbs.END, navigable=["Desk", "Mug"]),
+]  # fmt: skip
+
+
+def told(turns: list[Turn]) -> list[list[str]]:
+    """The lines of the memory, at each turn."""
+    lines: list[list[str]] = []
+    before: Perceived | None = None
+    for index, each in enumerate(turns):
+        now = Perceived.at(each, turns[index - 1] if index else None, before)
+        (text,) = user_turn(TEXTS, TASK, None, [], now, before)
+        lines.append(str(text).splitlines()[-2:])
+        before = now
+    return lines
+
+
+def test_the_user_tells_where_things_were_seen_and_where_the_agent_has_been() -> None:
+    assert told(TURNS) == [
+        [
+            "asked Mug in view far at Shelf, Box hidden, Pen hidden, Desk hidden",
+            "places Box, Desk, Drawer",  # a mirror holds nothing, and a plate is carried
+        ],
+        [
+            "asked Mug in view far at Shelf, Box hidden, Pen in view far, Desk hidden",
+            "places Box, Desk, Drawer",
+        ],
+        [
+            "asked Mug seen far at Shelf, Box hidden, Pen seen far, Desk hidden",
+            "places Box, Desk, Drawer 1/3",
+        ],
+        [  # the walk to the desk failed
+            "asked Mug seen far at Shelf, Box hidden, Pen seen far, Desk hidden",
+            "places Box, Desk, Drawer 1/3",
+        ],
+        ["asked Mug held, Box hidden, Pen seen far, Desk hidden", "places Desk"],
+        ["asked Mug held, Box hidden, Pen seen far, Desk near", "places Desk 1"],
+        ["asked Mug seen at Desk, Box hidden, Pen seen far, Desk hidden", "places Desk 1"],
+    ]
+
+
+def test_a_note_says_where_the_thing_was_seen_and_not_where_one_has_looked() -> None:
+    whole = Trajectory(
+        id="x", task_id="x", task_type="pickup_and_put", scene="FloorPlan1", instruction=TASK,
+        name="", key_actions=[], seed=0, kind="a", actor="expert", max_steps=9, turns=TURNS,
+        success=True, end_reason="end",
+    )  # fmt: skip
+    assert TEXTS.notes is not None
+    said = [note(TEXTS.notes, whole, index)[1] for index in (1, 2, 3)]
+    assert said == [
+        "goal pickup Mug to Box; Mug in view at Shelf",
+        "goal pickup Mug to Box; Mug seen at Shelf",
+        "failed navigate to Desk; goal pickup Mug to Box; Mug seen at Shelf",
+    ]
+
+
+def test_only_what_was_done_is_remembered() -> None:
+    been = Recalled().having_done(Action(GO, "Bed"), True, "")
+    assert been.visits == {"Bed": 1}
+    assert been.having_done(None, True, "") == been
+    assert been.having_done(Action(GO, "Bed"), False, "") == been
+    assert been.having_done(Action(PUT, "Bed"), False, "Pen") == been
+    assert been.having_done(Action(PUT, "Bed"), True, "Pen").lay == {"Pen": "Bed"}
+    assert been.having_done(Action(verbs.OPEN, "Bed"), True, "") == been
+    assert been.having_done(Action(GO, "Bed"), True, "").visits == {"Bed": 2}
