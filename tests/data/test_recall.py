@@ -49,7 +49,9 @@ def told(turns: list[Turn]) -> list[list[str]]:
     for index, each in enumerate(turns):
         now = Perceived.at(each, turns[index - 1] if index else None, before)
         (text,) = user_turn(TEXTS, TASK, None, [], now, before)
-        lines.append(str(text).splitlines()[-2:])
+        *scene, named, places = str(text).splitlines()
+        assert all(scene), "no line for what is not told"
+        lines.append([named, places])
         before = now
     return lines
 

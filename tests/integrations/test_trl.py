@@ -191,7 +191,8 @@ def test_rollouts_are_played_by_tools_and_their_reward_teaches(tmp_path: Path) -
 # -- plain text ------------------------------------------------------------------------------------
 
 
-def test_a_conversation_is_that_of_the_agent_with_the_same_dialect() -> None:
+@pytest.mark.parametrize("dialect", ["text", "text-recall"])
+def test_a_conversation_is_that_of_the_agent_with_the_same_dialect(dialect: str) -> None:
     from agents.vlm.agent import VLMAgent
     from agents.vlm.clients.scripted import ScriptedClient
     from agents.vlm.matching import Matcher
@@ -203,11 +204,11 @@ def test_a_conversation_is_that_of_the_agent_with_the_same_dialect() -> None:
     said = ["navigate to Dresser", "observe", "open Dresser", "end"]
     replies = [f"<Planning>so</Planning>\n<DecisionMaking>{each}</DecisionMaking>" for each in said]
     left = iter(replies)
-    options = AgentSettings(sees="text", prompts=Prompts(dialect="text"))
+    options = AgentSettings(sees="text", prompts=Prompts(dialect=dialect))
     client = ScriptedClient(lambda _: next(left))
     agent = VLMAgent(client, options, prompts_for(options), Matcher(options.matching))
     env = EmbodiedEnv(obs_mode="objects", **ROOM)
-    talk = Conversation(EmbodiedEnv(obs_mode="objects", **ROOM))
+    talk = Conversation(EmbodiedEnv(obs_mode="objects", **ROOM), dialect)
     task = a_task(SEARCH)
     obs, info = env.reset(options={"task": task})
     agent.reset(task, obs, with_details(env, info))
