@@ -89,8 +89,17 @@ def dialect_prompts(dialect: str, language: Language) -> DialectPrompts:
     """
     loaded = load_dialect(dialect)
     texts = loaded.texts_in(language)
-    # Not what a prompt does not depend on, nor what older versions did not have, so that older
-    # runs can be continued.
+    return DialectPrompts(
+        name=f"{dialect}/{language}",
+        digest=digest_of(texts),
+        about=f"the texts of the dialect {dialect} in {language}",
+        texts=texts,
+    )
+
+
+def digest_of(texts: DialectTexts) -> str:
+    """The sha256, in hex, of the texts without what no prompt depends on, and without what they do
+    not use of what older versions did not have: so that older runs can be continued."""
     left_out: dict[str, Any] = {"frames": True}
     left_out |= {"scene_by": True} if texts.scene_by == "user" else {}
     left_out |= {name: True for name in ("named", "places") if getattr(texts, name) is None}
@@ -101,9 +110,4 @@ def dialect_prompts(dialect: str, language: Language) -> DialectPrompts:
     digest = hashlib.sha256(texts.model_dump_json(exclude=left_out).encode())
     if verbs.ADDED:
         digest.update(repr(verbs.ADDED).encode())
-    return DialectPrompts(
-        name=f"{dialect}/{language}",
-        digest=digest.hexdigest(),
-        about=f"the texts of the dialect {dialect} in {language}",
-        texts=texts,
-    )
+    return digest.hexdigest()

@@ -92,7 +92,7 @@ def note(words: NoteWords, trajectory: Trajectory, index: int) -> tuple[ThoughtK
             wanted = subgoal.place
         how_far = _how_far(known, wanted)
         told = getattr(words, how_far).replace("{thing}", wanted)
-        if how_far in ("view", "seen") and (place := known.where(wanted)):
+        if how_far in ("view", "seen") and (place := known.lay.get(wanted)):
             told += words.at.replace("{place}", place)
         parts += [goal, told]
     looked = [

@@ -2,12 +2,13 @@
 
 A model of a few million weights forgets what it saw in passing, and goes to places that it cannot
 reach yet. A dialect with words for it tells the model: ``asked Mug seen at Shelf`` for a mug that
-is out of view, and ``places Drawer 2/5, Sofa 1, Shelf`` for the places that it can go to, with how
-often it was there and how many of them it has seen.
+is out of view, and ``places Drawer 2/5, Shelf, Sofa 1`` for the places that it can go to, with how
+often it was there and how many of them it has seen in one view.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -21,35 +22,36 @@ from er_gym.thor import OBJECT_TYPES
 
 
 class PlaceWords(BaseModel):
-    """The words for the places that an agent can go to; the line comes last.
+    """The words for the places that an agent can go to (:func:`places_text`); the line comes last.
 
     Attributes:
         told: lists them, ``{places}``.
         times: a place where it has been, with ``{place}`` and how often, ``{count}``.
-        of: the same of several, of which it has seen ``{number}`` at once.
+        times_of_several: the same of a type of which it has seen ``{number}`` in one view.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     told: str
     times: str
-    of: str
+    times_of_several: str
 
 
 @dataclass(frozen=True)
 class Recalled:
-    """What an agent remembers before it decides; by object type.
+    """What an agent remembers before it decides; by object type. It does not tell two objects of a
+    type apart: of two mugs it remembers the one that it saw or put down last.
 
     Attributes:
         lay: on what it lay when it was in view last, or where the agent has put it since; ``""``
-            for what was seen on nothing.
+            for what was seen on nothing. What was sliced is forgotten.
         visits: how often the agent went there.
-        number: how many of them were in view at once, at most.
+        most_in_view: how many of them were in one view, at most.
     """
 
     lay: Mapping[str, str] = field(default_factory=dict)
     visits: Mapping[str, int] = field(default_factory=dict)
-    number: Mapping[str, int] = field(default_factory=dict)
+    most_in_view: Mapping[str, int] = field(default_factory=dict)
 
     def having_done(self, action: Action | None, success: bool, held: str) -> Recalled:
         """What it remembers after an action.
@@ -66,32 +68,40 @@ class Recalled:
             visits[there] = visits.get(there, 0) + 1
         elif action.verb == verbs.PUT and held:
             lay[held] = there
-        return Recalled(lay, visits, self.number)
+        elif action.verb == verbs.SLICE:
+            lay.pop(there, None)
+        return Recalled(lay, visits, self.most_in_view)
 
-    def having_seen(self, view: Sequence[SeenObject], around: Sequence[SeenObject]) -> Recalled:
+    def having_seen(
+        self, view: Sequence[SeenObject], views: Mapping[str, Sequence[SeenObject]]
+    ) -> Recalled:
         """What it remembers after it sees objects, ahead and in the views around."""
-        number = {**self.number}
-        seen: dict[str, int] = {}
-        for one in (*view, *around):
-            seen[one.type] = seen.get(one.type, 0) + 1
-            number[one.type] = max(number.get(one.type, 0), seen[one.type])
-        return Recalled({**self.lay, **where_each_lies(view, around)}, self.visits, number)
+        most = Counter(self.most_in_view)
+        for each in (view, *views.values()):  # views overlap
+            most |= Counter(one.type for one in each)
+        return Recalled({**self.lay, **where_each_lies(view, views)}, self.visits, most)
 
 
-def where_each_lies(view: Sequence[SeenObject], around: Sequence[SeenObject]) -> dict[str, str]:
-    """By type, on what the nearest lies; of the views around only if none is ahead."""
+def where_each_lies(
+    view: Sequence[SeenObject], views: Mapping[str, Sequence[SeenObject]]
+) -> dict[str, str]:
+    """By type, on what the nearest ahead lies, or if none is ahead, the nearest of the first view
+    around that has one."""
+    around = [one for each in views.values() for one in each]
     return {one.type: one.on for one in (*reversed(around), *reversed(view))}
 
 
 def places_text(words: PlaceWords, navigable: Iterable[str], recalled: Recalled) -> str:
-    """The places that the agent can go to, in a line; ``""`` for none. What it could pick up is a
-    place if it opens, such as a box, but no plate."""
+    """The places that the agent can go to, in a line; ``""`` for none.
+
+    A place is a receptacle that cannot be picked up, or one that opens, such as a box.
+    """
 
     def place(name: str) -> str:
-        count, number = recalled.visits.get(name, 0), recalled.number.get(name, 0)
+        count, number = recalled.visits.get(name, 0), recalled.most_in_view.get(name, 0)
         if not count:
             return name
-        text = words.of if number > 1 else words.times
+        text = words.times_of_several if number > 1 else words.times
         filled = text.replace("{place}", name).replace("{count}", str(count))
         return filled.replace("{number}", str(number))
 
@@ -101,6 +111,8 @@ def places_text(words: PlaceWords, navigable: Iterable[str], recalled: Recalled)
 
 @cache
 def _is_place(object_type: str) -> bool:
+    if object_type not in OBJECT_TYPES:  # tasks may name types that no room has
+        return False
     properties = OBJECT_TYPES[object_type].properties
     return "receptacle" in properties and (
         "pickupable" not in properties or "openable" in properties

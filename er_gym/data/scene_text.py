@@ -34,17 +34,19 @@ class Perceived:
     recalled: Recalled = field(default_factory=Recalled)
 
     @classmethod
-    def at(cls, turn: Turn, last: Turn | None = None, before: Perceived | None = None) -> Perceived:
+    def at(
+        cls, turn: Turn, last_turn: Turn | None = None, before: Perceived | None = None
+    ) -> Perceived:
         """What was perceived at a turn of a trajectory.
 
         Args:
             turn: the turn.
-            last, before: the turn before it, and what was perceived there; None at first.
+            last_turn: the turn before it, and ``before``: what was perceived there; None at first.
         """
         now = cls(turn.view, turn.views, turn.held, turn.navigable, turn.interactable)
-        if before is None or last is None:
+        if before is None or last_turn is None:
             return now._remembering(Recalled())
-        done = before.recalled.having_done(last.action, last.success, before.held)
+        done = before.recalled.having_done(last_turn.action, last_turn.success, before.held)
         return now._remembering(done)
 
     @classmethod
@@ -72,7 +74,7 @@ class Perceived:
 
     def _remembering(self, recalled: Recalled) -> Perceived:
         """The same, with what was remembered before and what is seen now."""
-        return replace(self, recalled=recalled.having_seen(self.view, self.around))
+        return replace(self, recalled=recalled.having_seen(self.view, self.views))
 
     @property
     def around(self) -> Sequence[SeenObject]:
@@ -120,10 +122,11 @@ class NamedWords(BaseModel):
     Attributes:
         told: lists them, ``{things}``.
         held, near, view, hidden: in the hand, within reach, in view, and not in view.
-        seen: out of view, but seen before; ``""`` if that is told as ``hidden``.
+        seen: out of view, but seen before, or an object that the task says it can navigate to;
+            ``""`` if that is told as ``hidden``.
         at: for an object in view, or seen, that lies or lay in or on another, ``{place}``.
-        far: for an object in view, or seen, that the agent cannot navigate to; ``""`` if that is
-            not told.
+        far: follows for an object in view, or seen, that the agent cannot navigate to; ``""`` if
+            that is not told.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -214,7 +217,7 @@ def scene_text(words: SceneWords, now: Perceived, before: Perceived | None, *, s
 
 def named_text(words: NamedWords, named: Sequence[str], now: Perceived) -> str:
     """Where objects of some types are, in one line; ``""`` if no type is given."""
-    in_view = where_each_lies(now.view, now.around)
+    in_view = where_each_lies(now.view, now.views)
     lay = {**now.recalled.lay, **in_view}
 
     def how_far(name: str) -> str:
@@ -222,12 +225,14 @@ def named_text(words: NamedWords, named: Sequence[str], now: Perceived) -> str:
             return words.held
         if name in now.interactable:
             return words.near
-        if name not in in_view and not (words.seen and name in lay):
+        seen = name in lay or name in now.navigable
+        if name not in in_view and not (words.seen and seen):
             return words.hidden
         told = words.view if name in in_view else words.seen
-        if words.far and name not in now.navigable:
-            told += f" {words.far}"
-        return told + (words.at.replace("{place}", lay[name]) if lay[name] else "")
+        if name not in now.navigable:
+            told += words.far
+        place = lay.get(name)
+        return told + (words.at.replace("{place}", place) if place else "")
 
     told = ", ".join(f"{name} {how_far(name)}" for name in named)
     return words.told.replace("{things}", told) if told else ""

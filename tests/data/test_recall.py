@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
+from er_gym import EmbodiedEnv
 from er_gym.data.dialects import load_dialect, user_turn
 from er_gym.data.notes import note
 from er_gym.data.recall import Recalled
 from er_gym.data.scene_text import Perceived
 from er_gym.data.trajectory import SeenObject, Subgoal, Trajectory, Turn
 from er_gym.envs.actions import Action
-from er_gym.tasks import verbs
+from er_gym.envs.info import with_details
+from er_gym.tasks import load_suite, verbs
 
 TEXTS = load_dialect("text-recall").texts["en"]
 TASK = "Put the Mug in the Box, and the Pen on the Desk."
@@ -59,24 +63,24 @@ def told(turns: list[Turn]) -> list[list[str]]:
 def test_the_user_tells_where_things_were_seen_and_where_the_agent_has_been() -> None:
     assert told(TURNS) == [
         [
-            "asked Mug in view far at Shelf, Box hidden, Pen hidden, Desk hidden",
+            "asked Mug in view far at Shelf, Box seen, Pen hidden, Desk seen",
             "places Box, Desk, Drawer",  # a mirror holds nothing, and a plate is carried
         ],
         [
-            "asked Mug in view far at Shelf, Box hidden, Pen in view far, Desk hidden",
+            "asked Mug in view far at Shelf, Box seen, Pen in view far, Desk seen",
             "places Box, Desk, Drawer",
         ],
         [
-            "asked Mug seen far at Shelf, Box hidden, Pen seen far, Desk hidden",
-            "places Box, Desk, Drawer 1/3",
+            "asked Mug seen far at Shelf, Box seen, Pen seen far, Desk seen",
+            "places Box, Desk, Drawer 1/2",  # views overlap, so only one counts
         ],
         [  # the walk to the desk failed
-            "asked Mug seen far at Shelf, Box hidden, Pen seen far, Desk hidden",
-            "places Box, Desk, Drawer 1/3",
+            "asked Mug seen far at Shelf, Box seen, Pen seen far, Desk seen",
+            "places Box, Desk, Drawer 1/2",
         ],
-        ["asked Mug held, Box hidden, Pen seen far, Desk hidden", "places Desk"],
+        ["asked Mug held, Box hidden, Pen seen far, Desk seen", "places Desk"],
         ["asked Mug held, Box hidden, Pen seen far, Desk near", "places Desk 1"],
-        ["asked Mug seen at Desk, Box hidden, Pen seen far, Desk hidden", "places Desk 1"],
+        ["asked Mug seen at Desk, Box hidden, Pen seen far, Desk seen", "places Desk 1"],
     ]
 
 
@@ -104,3 +108,40 @@ def test_only_what_was_done_is_remembered() -> None:
     assert been.having_done(Action(PUT, "Bed"), True, "Pen").lay == {"Pen": "Bed"}
     assert been.having_done(Action(verbs.OPEN, "Bed"), True, "") == been
     assert been.having_done(Action(GO, "Bed"), True, "").visits == {"Bed": 2}
+
+
+def test_what_was_sliced_is_forgotten() -> None:
+    bread = Recalled({"Bread": "Plate"})
+    assert bread.having_done(Action(verbs.SLICE, "Bread"), False, "Knife") == bread
+    assert bread.having_done(Action(verbs.SLICE, "Bread"), True, "Knife").lay == {}
+
+
+def test_what_is_ahead_and_near_comes_first() -> None:
+    ahead = [sees("Mug", "Bed"), sees("Mug", "Desk")]
+    around = {"right": [sees("Mug", "Sofa"), sees("Pen", "Sofa")], "left": [sees("Pen", "Bed")]}
+    assert Recalled().having_seen(ahead, around).lay == {"Mug": "Bed", "Pen": "Sofa"}
+
+
+def test_a_task_may_say_what_the_agent_can_go_to() -> None:
+    """Also types that no room has."""
+    now = Perceived(navigable=["Bookshelf", "Desk", "Pen"])
+    (text,) = user_turn(TEXTS, TASK, None, [], now)
+    assert str(text).splitlines()[-2:] == [
+        "asked Mug hidden, Box hidden, Pen seen, Desk seen",
+        "places Desk",
+    ]
+
+
+def test_a_look_around_counts_no_object_twice() -> None:
+    env = EmbodiedEnv("mini", obs_mode="objects")
+    for task in load_suite("mini").tasks[::40]:
+        _, info = env.reset(options={"task": task})
+        before, seen = Perceived.of(with_details(env, info)), set()
+        for action in (Action(verbs.OBSERVE), Action(verbs.OBSERVE)):
+            info = with_details(env, env.step(action)[-1])
+            before = Perceived.of(info, before)
+            views = (info["object_views"], *info["object_views_around"].values())
+            seen |= {(each.object_type, each.object_id) for view in views for each in view}
+        there = Counter(kind for kind, _ in seen)
+        assert all(count <= there[kind] for kind, count in before.recalled.most_in_view.items())
+    env.close()

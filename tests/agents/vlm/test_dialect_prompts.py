@@ -15,6 +15,7 @@ from agents.expert.recorder import FOLDERS, OBS_MODE, TrajectoryHeader, Trajecto
 from agents.vlm.agent import VLMAgent
 from agents.vlm.chat import Message, Picture
 from agents.vlm.clients.scripted import ScriptedClient
+from agents.vlm.dialect_prompts import digest_of
 from agents.vlm.matching import Matcher
 from agents.vlm.pictures import encode
 from agents.vlm.prompts import load_prompts, prompts_for
@@ -275,6 +276,16 @@ def test_settings_that_do_not_fit_a_dialect(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="lacks the language 'zh'"):
         load_prompts(mine(language="zh"))
     digest = load_prompts(Prompts(dialect="paper")).digest
+    # Runs in this dialect can be continued as long as nothing that it does not use counts.
+    texts = load_dialect("text").texts["en"]
+    assert load_prompts(Prompts(dialect="text")).digest == digest_of(texts)
+    assert digest_of(texts).startswith("fc28417354fc")
+    assert texts.named is not None
+    assert texts.notes is not None
+    named = texts.named.model_copy(update={"seen": "seen"})
+    notes = texts.notes.model_copy(update={"at": "at"})
+    for more in ({"named": named}, {"notes": notes}):
+        assert digest_of(texts.model_copy(update=more)) != digest_of(texts)
     assert load_prompts(mine()).digest == digest
     (tmp_path / "en.yaml").write_text(english.replace("Task:", "Job:"))
     assert load_prompts(mine()).digest != digest
