@@ -103,7 +103,7 @@ def digest_of(texts: DialectTexts) -> str:
     left_out: dict[str, Any] = {"frames": True}
     left_out |= {"scene_by": True} if texts.scene_by == "user" else {}
     left_out |= {name: True for name in ("named", "places") if getattr(texts, name) is None}
-    for name, words in (("named", ("seen", "far")), ("notes", ("at",))):
+    for name, words in (("named", ("seen", "far")), ("notes", ("far", "at"))):
         told = getattr(texts, name)
         if told is not None and not any(getattr(told, word) for word in words):
             left_out[name] = {*words}

@@ -29,6 +29,8 @@ class NoteWords(BaseModel):
         goal: the goal, with ``{verb}`` and ``{thing}``; ``to``: the destination, ``{place}``.
         held, near, view, seen, unseen: where the wanted object ``{thing}`` is: in the hand, within
             reach, in view, seen before, never seen.
+        far: follows for a thing in view or seen before that the agent cannot navigate to; ``""``
+            where notes do not tell that.
         at: for a thing in view or seen before that lies or lay in or on another, ``{place}``;
             ``""`` where notes do not tell that.
         looked: the places searched for it, ``{places}``; ``""`` where notes do not tell them;
@@ -52,6 +54,7 @@ class NoteWords(BaseModel):
     view: str
     seen: str
     unseen: str
+    far: str = ""
     at: str = ""
     looked: str
     times: str
@@ -92,8 +95,10 @@ def note(words: NoteWords, trajectory: Trajectory, index: int) -> tuple[ThoughtK
             wanted = subgoal.place
         how_far = _how_far(known, wanted)
         told = getattr(words, how_far).replace("{thing}", wanted)
-        if how_far in ("view", "seen") and (place := known.lay.get(wanted)):
-            told += words.at.replace("{place}", place)
+        if how_far in ("view", "seen"):
+            told += words.far if wanted not in known.navigable else ""
+            place = known.lay.get(wanted)
+            told += words.at.replace("{place}", place) if place else ""
         parts += [goal, told]
     looked = [
         place

@@ -93,9 +93,9 @@ def test_a_note_says_where_the_thing_was_seen_and_not_where_one_has_looked() -> 
     assert TEXTS.notes is not None
     said = [note(TEXTS.notes, whole, index)[1] for index in (1, 2, 3)]
     assert said == [
-        "goal pickup Mug to Box; Mug in view at Shelf",
-        "goal pickup Mug to Box; Mug seen at Shelf",
-        "failed navigate to Desk; goal pickup Mug to Box; Mug seen at Shelf",
+        "goal pickup Mug to Box; Mug in view far at Shelf",
+        "goal pickup Mug to Box; Mug seen far at Shelf",
+        "failed navigate to Desk; goal pickup Mug to Box; Mug seen far at Shelf",
     ]
 
 
