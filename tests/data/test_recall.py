@@ -84,19 +84,30 @@ def test_the_user_tells_where_things_were_seen_and_where_the_agent_has_been() ->
     ]
 
 
-def test_a_note_says_where_the_thing_was_seen_and_not_where_one_has_looked() -> None:
+def noted(turns: list[Turn], index: int) -> str:
     whole = Trajectory(
         id="x", task_id="x", task_type="pickup_and_put", scene="FloorPlan1", instruction=TASK,
-        name="", key_actions=[], seed=0, kind="a", actor="expert", max_steps=9, turns=TURNS,
+        name="", key_actions=[], seed=0, kind="a", actor="expert", max_steps=9, turns=turns,
         success=True, end_reason="end",
     )  # fmt: skip
     assert TEXTS.notes is not None
-    said = [note(TEXTS.notes, whole, index)[1] for index in (1, 2, 3)]
-    assert said == [
+    return note(TEXTS.notes, whole, index)[1]
+
+
+def test_a_note_says_where_the_thing_was_seen_and_not_where_one_has_looked() -> None:
+    """In the user's words, so that it can be copied."""
+    assert [noted(TURNS, index) for index in (1, 2, 3)] == [
         "goal pickup Mug to Box; Mug in view far at Shelf",
         "goal pickup Mug to Box; Mug seen far at Shelf",
         "failed navigate to Desk; goal pickup Mug to Box; Mug seen far at Shelf",
     ]
+
+
+def test_a_note_does_not_take_a_sink_for_its_basin() -> None:
+    goal = Subgoal(verb=verbs.PUT, thing="Egg", place="SinkBasin")
+    view = [sees("Sink", "CounterTop"), sees("SinkBasin", "Sink")]
+    here = turn(GO, "Sink", subgoal=goal, held="Egg", view=view, navigable=["SinkBasin"])
+    assert noted([here], 0) == "goal put in Egg to SinkBasin; SinkBasin in view at Sink"
 
 
 def test_only_what_was_done_is_remembered() -> None:
