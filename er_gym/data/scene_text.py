@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict
 
 from er_gym.data.recall import Recalled, where_each_lies
 from er_gym.data.trajectory import SeenObject, Turn
+from er_gym.envs.actions import Action
 from er_gym.envs.info import action_of, detail
 
 
@@ -44,10 +45,9 @@ class Perceived:
             last_turn: the turn before it, and ``before``: what was perceived there; None at first.
         """
         now = cls(turn.view, turn.views, turn.held, turn.navigable, turn.interactable)
-        if before is None or last_turn is None:
-            return now._remembering(Recalled())
-        done = before.recalled.having_done(last_turn.action, last_turn.success, before.held)
-        return now._remembering(done)
+        if last_turn is None:
+            return now._after(None, None, False)
+        return now._after(before, last_turn.action, last_turn.success)
 
     @classmethod
     def of(cls, info: Mapping[str, Any], before: Perceived | None = None) -> Perceived:
@@ -67,14 +67,14 @@ class Perceived:
             list(info["navigable"]),
             list(info["interactable"]),
         )
-        if before is None:
-            return now._remembering(Recalled())
-        success = bool(info["action_success"])
-        return now._remembering(before.recalled.having_done(action_of(info), success, before.held))
+        return now._after(before, action_of(info), bool(info["action_success"]))
 
-    def _remembering(self, recalled: Recalled) -> Perceived:
-        """The same, with what was remembered before and what is seen now."""
-        return replace(self, recalled=recalled.having_seen(self.view, self.views))
+    def _after(self, before: Perceived | None, action: Action | None, success: bool) -> Perceived:
+        """The same, with what is remembered after an action; ``before`` is None at first."""
+        done = Recalled()
+        if before is not None:
+            done = before.recalled.having_done(action, success, before.held)
+        return replace(self, recalled=done.having_seen(self.view, self.views))
 
     @property
     def around(self) -> Sequence[SeenObject]:

@@ -72,7 +72,7 @@ def test_the_user_tells_where_things_were_seen_and_where_the_agent_has_been() ->
         ],
         [
             "asked Mug seen far at Shelf, Box seen, Pen seen far, Desk seen",
-            "places Box, Desk, Drawer 1/2",  # views overlap, so only one counts
+            "places Box, Desk, Drawer 1/2",  # the most in one view, since views overlap
         ],
         [  # the walk to the desk failed
             "asked Mug seen far at Shelf, Box seen, Pen seen far, Desk seen",
@@ -105,7 +105,7 @@ def test_a_note_says_where_the_thing_was_seen_and_not_where_one_has_looked() -> 
 
 def test_a_note_does_not_take_a_sink_for_its_basin() -> None:
     goal = Subgoal(verb=verbs.PUT, thing="Egg", place="SinkBasin")
-    view = [sees("Sink", "CounterTop"), sees("SinkBasin", "Sink")]
+    view = [sees("SinkBasin", "Sink"), sees("Sink", "CounterTop")]
     here = turn(GO, "Sink", subgoal=goal, held="Egg", view=view, navigable=["SinkBasin"])
     assert noted([here], 0) == "goal put in Egg to SinkBasin; SinkBasin in view at Sink"
 
