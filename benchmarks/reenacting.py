@@ -22,9 +22,12 @@ from agents.expert.players import PlaySettings, header_of
 from agents.expert.prescreen import ATTEMPT
 from agents.expert.recipe import Recipe
 from agents.expert.replayed import ReplayedCourse
+from agents.expert.successors import RecordedTakesOver
+from agents.expert.takeover import TakeoverCourse
 from agents.expert.thinker import ThinkingAgent
 from agents.expert.thought_kinds import ThoughtKinds
 from agents.expert.writers.registry import checked_grounded
+from agents.zoo.index import PREFIX
 from benchmarks.reenacted import Attempt, DecidedCourse, Reenacted, Witness
 from er_gym.data.collection import CollectionError, CollectionManifest
 from er_gym.data.line_index import Line
@@ -258,4 +261,9 @@ def _course(candidate: Candidate, trajectory: Trajectory, told: Told) -> Course:
         return ReplayedCourse(candidate.task, trajectory.turns)  # type: ignore[arg-type]
     if told.model_decides:
         return DecidedCourse(candidate.task, trajectory.turns)
+    if candidate.beginning is not None and candidate.correct_by.startswith(PREFIX):
+        # A policy's choice is the largest of numbers, which another machine may round otherwise.
+        repeated = candidate.beginning.actions
+        decided = [turn.action for turn in trajectory.turns[len(repeated) :]]
+        return TakeoverCourse(candidate.task, repeated, RecordedTakesOver(decided))
     return candidate.course(trajectory.seed, told.play.kinds)

@@ -45,7 +45,7 @@ _OF_AGENTS = {
     },
     "agents.expert.writers": {"agents.scripted.searcher", "agents.vlm"},
     "agents.expert": {
-        *("agents", "agents.configs", "agents.expert.writers"),
+        *("agents", "agents.configs", "agents.expert.writers", "agents.zoo"),
         *("agents.scripted.searcher", "agents.vlm"),
     },
     "agents.finetune": {"agents.configs", "agents.vlm", "agents.vlm.clients"},

@@ -13,14 +13,15 @@ from functools import lru_cache
 from random import Random
 from typing import Protocol
 
-from agents.expert.corrections import Beginning, CorrectBy
+from agents.expert.corrections import Beginning
 from agents.expert.course import Course
 from agents.expert.expert import CorrectedCourse, ExpertCourse
 from agents.expert.explorer import ExplorerCourse, Strength
 from agents.expert.kinds import ORDERED_KIND, draw_mode
 from agents.expert.places import DrawnPlaces, PlaceChooser
 from agents.expert.recipe import ANOMALY, CORRECTED, EXPLORED, SEARCH, Part
-from agents.expert.takeover import SEARCHERS, SearcherCourse
+from agents.expert.successors import successor
+from agents.expert.takeover import TakeoverCourse
 from agents.expert.thought_kinds import ThoughtKinds
 from er_gym.tasks.task import Task
 
@@ -41,7 +42,7 @@ class Candidate:
         explorer: the name of an explorer's strength.
         strength: how well the explorer plays.
         beginning: of the failed episode that is corrected.
-        correct_by: who corrects it.
+        correct_by: who corrects it, see :data:`agents.expert.successors.CORRECTORS`.
         run: where the failed episode is, ``episode`` its key there. Of an episode that is replayed:
             the path of its run.
         repeats: the share of actions that are repeated without need.
@@ -58,7 +59,7 @@ class Candidate:
     explorer: str = ""
     strength: Strength | None = None
     beginning: Beginning | None = None
-    correct_by: CorrectBy = "expert"
+    correct_by: str = "expert"
     run: str = ""
     episode: str = ""
     repeats: float = 0.0
@@ -85,7 +86,7 @@ class Candidate:
         task = self.played_task
         check = kinds.draw_check(task, random)
         if self.beginning is not None and self.correct_by != "expert":
-            return SearcherCourse(task, self.beginning.actions, SEARCHERS[self.correct_by]())
+            return TakeoverCourse(task, self.beginning.actions, successor(self.correct_by))
         if self.beginning is not None:
             return CorrectedCourse(task, self.beginning.actions, random, check)
         if self.strength is not None:

@@ -18,7 +18,6 @@ from agents.expert.corrections import (
     SEVERAL,
     Beginning,
     CorrectAfter,
-    CorrectBy,
     correction_points,
 )
 from agents.expert.explorer import Strength
@@ -26,6 +25,7 @@ from agents.expert.players import Players, PlaySettings
 from agents.expert.prescreen import prescreen
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
 from agents.expert.recorded_replies import recorded_replies
+from agents.expert.recorder import joined_modes
 from er_gym.data.collection import Collection, CollectionError
 from er_gym.data.trajectory import Language, Trajectory
 from er_gym.envs.actions import Action
@@ -59,6 +59,7 @@ class CollectSettings:
         play: what all players share.
         seed: of everything that is drawn.
         manifest: what the parts' manifests have in common with the collection's.
+        corrector_observes: the observations that who takes over needs besides the players'.
     """
 
     recipe: Recipe
@@ -67,6 +68,7 @@ class CollectSettings:
     play: PlaySettings
     seed: int
     manifest: Mapping[str, Any]
+    corrector_observes: str = ""
 
 
 @dataclass
@@ -197,7 +199,7 @@ def correction_strata(
     run_directory: RunDirectory,
     limit: int | None,
     after: CorrectAfter = "wrong",
-    by: CorrectBy = "expert",
+    by: str = "expert",
     max_steps: int | None = None,
     own_thoughts_in: Language | None = None,
 ) -> tuple[dict[tuple[str, str], Stratum], dict[str, int]]:
@@ -208,7 +210,7 @@ def correction_strata(
         run_directory: the run.
         limit: how many trajectories in all; None for as many as there are.
         after: the action after which another agent takes over.
-        by: the agent that takes over.
+        by: the agent that takes over (:data:`agents.expert.successors.CORRECTORS`).
         max_steps: the step limit of the corrections; None for that of the episodes.
         own_thoughts_in: the language of the collection, if what its trajectories repeat is to keep
             the thoughts of the agent that failed.
@@ -379,10 +381,8 @@ class Collector:
     @property
     def _obs_mode(self) -> str:
         """What the players need to observe, without pictures if none are recorded."""
-        modes = self._players.obs_mode.split("+")
-        if self._settings.play.pictures is None:
-            modes.remove("rgb")
-        return "+".join(modes)
+        modes = joined_modes(self._players.obs_mode, self._settings.corrector_observes)
+        return modes if self._settings.play.pictures else modes.replace("rgb+", "", 1)
 
     def _choose_enough(self, strata: Sequence[Stratum], env: Mapping[str, Any], most: int) -> None:
         """Choose candidates to be played until there are enough, or no more."""
@@ -401,6 +401,7 @@ class Collector:
         for prescreened in prescreen(
             [each for _, candidates in rounds for each in candidates],
             env=env,
+            observes=self._settings.corrector_observes,
             seed=self._settings.seed,
             kinds=self._settings.play.kinds,
             most_actions=most,

@@ -28,10 +28,6 @@ CorrectAfter: TypeAlias = Literal["wrong", "failure", "anywhere", "refusal"]
 """
 SEVERAL: frozenset[CorrectAfter] = frozenset(("anywhere", "refusal"))
 """Those that begin several corrections of an episode."""
-CorrectBy: TypeAlias = Literal["expert", "searcher", "spotter"]
-"""Who takes over: the ``expert``, which knows where things are; or the ``searcher`` or the
-``spotter``, which know the instruction and what the failed episode has seen
-(:mod:`agents.expert.takeover`)."""
 ROOM = 10
 """Steps that the expert needs after a failure."""
 DRAWS = 6

@@ -33,7 +33,7 @@ class Intent:
 
 @dataclass(frozen=True)
 class View:
-    """The parts of ``info`` that a course reads after a step."""
+    """What a course reads after a step: parts of ``info``, and all of it."""
 
     visible: frozenset[str]
     held: str
@@ -46,9 +46,10 @@ class View:
     left: tuple[KeyAction, ...]
     steps_left: int
     info: Mapping[str, Any]
+    obs: Mapping[str, Any]
 
     @classmethod
-    def of(cls, info: Mapping[str, Any]) -> View:
+    def of(cls, obs: Mapping[str, Any], info: Mapping[str, Any]) -> View:
         """Read ``info`` with its details."""
         return cls(
             visible=frozenset(detail(info, "visible")),
@@ -62,6 +63,7 @@ class View:
             left=info["keys_left"],
             steps_left=info["max_steps"] - info["steps"],
             info=info,
+            obs=obs,
         )
 
 

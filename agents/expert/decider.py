@@ -19,6 +19,7 @@ from agents.expert.recorder import (
     OBS_MODE,
     TrajectoryHeader,
     TrajectoryRecorder,
+    joined_modes,
     thoughts_text,
 )
 from agents.expert.replayed_intents import replayed_purpose
@@ -62,7 +63,7 @@ class DecidingAgent:
         rejects: Callable[[Trajectory], str],
         instruct: Callable[[Task], str] = lambda task: task.instruction,
     ) -> None:
-        self.obs_mode = obs_mode_of(agent.obs_mode)
+        self.obs_mode = joined_modes(OBS_MODE, agent.obs_mode)
         self._agent, self._name, self._header = agent, name, header
         self._settings, self._rejects, self._instruct = settings, rejects, instruct
         self._recorder: TrajectoryRecorder | None = None
@@ -90,7 +91,7 @@ class DecidingAgent:
         intent = Intent(
             action,
             replayed_purpose(action, info["held"]),
-            self._subgoal(View.of(info)),
+            self._subgoal(View.of(obs, info)),
             plan=(action.object_type,) if action.verb == verbs.NAVIGATE else (),
         )
         recorder.begin_turn(intent, obs, info)
@@ -145,7 +146,7 @@ class Deciders:
     @property
     def obs_mode(self) -> str:
         """See :class:`~agents.expert.players.Players`."""
-        return obs_mode_of(self.factory.settings.obs_mode)
+        return joined_modes(OBS_MODE, self.factory.settings.obs_mode)
 
     def make(
         self, candidates: Mapping[str, Candidate], settings: PlaySettings, most_actions: int
@@ -224,9 +225,3 @@ def model_recipe(recipe: Recipe) -> Recipe:
         actor="explorer", types=types, explorers={MODEL: Strength()}, direct=1.0, most_actions=most
     )
     return Recipe(parts={MODEL: played})
-
-
-def obs_mode_of(needed: str) -> str:
-    """The observations for a trajectory and for an agent that needs others."""
-    names = [*OBS_MODE.split("+"), *needed.split("+")]
-    return "+".join(dict.fromkeys(names))

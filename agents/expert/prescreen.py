@@ -18,6 +18,7 @@ from agents.expert.acceptance import PlayedCourse, rejection
 from agents.expert.candidates import Candidate
 from agents.expert.corrections import first_mistake
 from agents.expert.course import Course, Intent, View
+from agents.expert.recorder import joined_modes
 from agents.expert.thought_kinds import ThoughtKinds
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.agent import Decision
@@ -50,6 +51,7 @@ def prescreen(
     candidates: Sequence[Candidate],
     *,
     env: Mapping[str, Any],
+    observes: str = "",
     seed: int,
     kinds: ThoughtKinds,
     most_actions: int,
@@ -61,6 +63,7 @@ def prescreen(
     Args:
         candidates: of one part.
         env: keyword arguments of the part's environment, without ``obs_mode``.
+        observes: the observations that the candidates' courses need.
         seed: the run's, from which an episode's seed is derived.
         kinds: draws how tasks end.
         most_actions: longer trajectories are not taken.
@@ -70,7 +73,8 @@ def prescreen(
     Raises:
         WorkerSetupError: the environment cannot be made.
     """
-    make = partial(_Prescreener, dict(env), seed, kinds, most_actions)
+    env = {**env, "obs_mode": joined_modes(SilentAgent.obs_mode, observes)}
+    make = partial(_Prescreener, env, seed, kinds, most_actions)
     jobs = [*_jobs(candidates)]
     with closing(
         worker_backend.run_jobs(make, jobs, workers=workers, affinity_key=_room)
@@ -109,7 +113,7 @@ class SilentAgent:
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """The course's next action."""
-        self._course.view = View.of(info)
+        self._course.view = View.of(obs, info)
         if self._intents is None:
             self._intents = self._course.intents()
         return Decision(next(self._intents).action)
@@ -121,7 +125,7 @@ class _Prescreener:
     def __init__(
         self, env: dict[str, Any], seed: int, kinds: ThoughtKinds, most_actions: int
     ) -> None:
-        self._env = EmbodiedEnv((), **{**env, "obs_mode": SilentAgent.obs_mode})
+        self._env = EmbodiedEnv((), **env)
         self._seed, self._kinds, self._most = seed, kinds, most_actions
 
     def __call__(self, job: Sequence[Candidate]) -> list[PrescreenResult]:

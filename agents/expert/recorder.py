@@ -47,6 +47,12 @@ FOLDERS = (PICTURES, PLAYED)
 """The folders of a run directory for what a recorder leaves."""
 
 
+def joined_modes(*modes: str) -> str:
+    """The observations that several modes ask for, as one mode; ``""`` asks for none."""
+    names = [name for mode in modes for name in mode.split("+") if name]
+    return "+".join(dict.fromkeys(names))
+
+
 @dataclass(frozen=True)
 class TrajectoryHeader:
     """The fields of a trajectory that are known before the episode begins.

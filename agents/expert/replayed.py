@@ -111,7 +111,7 @@ class QuotingAgent:
         recorder = self._recorder
         assert recorder is not None
         recorder.take_result(info)
-        self._course.view = View.of(info)
+        self._course.view = View.of(obs, info)
         if self._intents is None:
             self._intents = self._course.intents()
         intent = next(self._intents)

@@ -97,16 +97,24 @@ def dialect_prompts(dialect: str, language: Language) -> DialectPrompts:
     )
 
 
+_ADDED_WORDS = {
+    "named": ("seen", "far", "at_far"),
+    "notes": ("far", "at", "at_far"),
+    "places": ("opened",),
+}
+"""Words that older versions did not have; ``""`` where a dialect does not use them."""
+
+
 def digest_of(texts: DialectTexts) -> str:
     """The sha256, in hex, of the texts without what no prompt depends on, and without what they do
     not use of what older versions did not have: so that older runs can be continued."""
     left_out: dict[str, Any] = {"frames": True}
     left_out |= {"scene_by": True} if texts.scene_by == "user" else {}
     left_out |= {name: True for name in ("named", "places") if getattr(texts, name) is None}
-    for name, words in (("named", ("seen", "far")), ("notes", ("far", "at"))):
+    for name, words in _ADDED_WORDS.items():
         told = getattr(texts, name)
-        if told is not None and not any(getattr(told, word) for word in words):
-            left_out[name] = {*words}
+        if told is not None and (unused := {word for word in words if not getattr(told, word)}):
+            left_out[name] = unused
     digest = hashlib.sha256(texts.model_dump_json(exclude=left_out).encode())
     if verbs.ADDED:
         digest.update(repr(verbs.ADDED).encode())

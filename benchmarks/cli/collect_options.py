@@ -25,7 +25,7 @@ from benchmarks.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from agents.expert.corrections import CorrectAfter, CorrectBy
+    from agents.expert.corrections import CorrectAfter
     from er_gym.data.trajectory import Language
 
 
@@ -92,10 +92,11 @@ class CollectOptions(OptionGroup):
         "after up to six actions drawn at random, refused ones first; refusal: after up to six "
         "refused ones.  [default: wrong, as in the paper]",
     )
-    correct_by: CorrectBy | None = option(
-        type=click.Choice(("expert", "searcher", "spotter")),
-        help="With --correct: which agent takes over. The searcher and the spotter know only what "
-        "the failed agent knew.  [default: expert]",
+    correct_by: str | None = option(
+        metavar="[expert|searcher|spotter|zoo:NAME]",
+        help="With --correct: which agent takes over; zoo:NAME is a policy of the zoo, such as "
+        "zoo:all-sightings. All but the expert know only what the failed agent knew.  "
+        "[default: expert]",
     )
     correct_steps: int | None = option(
         type=click.IntRange(min=1),

@@ -50,6 +50,7 @@ def settings_of(
     """What decides the trajectories, and the manifest that states it."""
     from agents.expert.collect import CollectSettings, corrections_recipe
     from agents.expert.players import PlaySettings
+    from agents.expert.successors import EXPERT, check_corrector, successor
     from agents.expert.thought_kinds import load_thought_kinds
     from agents.vlm.settings import Pictures
     from er_gym import __version__
@@ -90,6 +91,7 @@ def settings_of(
         seed=seed,
         er_gym=__version__,
     )
+    by = options.correct_by or EXPERT
     settings = CollectSettings(
         recipe=stated,
         tasks=tasks,
@@ -97,6 +99,7 @@ def settings_of(
         play=PlaySettings(kinds, pictures, options.language),
         seed=seed,
         manifest=manifest.model_dump(mode="json"),
+        corrector_observes="" if check_corrector(by) == EXPERT else successor(by).observes,
     )
     return settings, manifest
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from agents.configs import StrictSettings
-from agents.expert.corrections import CorrectAfter, CorrectBy
+from agents.expert.corrections import CorrectAfter
+from agents.expert.successors import check_corrector
 from agents.finetune.settings import STAGES, Stage
 from benchmarks.study.settings import (
     Collected,
@@ -70,7 +71,7 @@ class Sampled(StrictSettings):
         limit: the most trajectories that are taken; None for all.
         correct_after: of its failures, after which action the expert takes over
             (:data:`agents.expert.corrections.CorrectAfter`).
-        correct_by: who takes over (:data:`agents.expert.corrections.CorrectBy`).
+        correct_by: who takes over (:data:`agents.expert.successors.CORRECTORS`).
         own_thoughts: whether what a correction repeats keeps the thoughts of the agent that failed.
         successes: in the third stage, whether its successes are learnt from, too; those with
             failed actions among them, but for the failed turns.
@@ -87,7 +88,7 @@ class Sampled(StrictSettings):
     faults: float = Field(0.0, ge=0, le=1)
     limit: Positive | None = None
     correct_after: CorrectAfter = "wrong"
-    correct_by: CorrectBy = "expert"
+    correct_by: Annotated[str, AfterValidator(check_corrector)] = "expert"
     own_thoughts: bool = False
     successes: bool = False
     earlier: bool = False

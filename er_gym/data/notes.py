@@ -15,6 +15,7 @@ from itertools import takewhile
 from pydantic import BaseModel, ConfigDict
 
 from er_gym.data.knowledge import Knowledge, LastAction, knowledge_at
+from er_gym.data.recall import lying_text
 from er_gym.data.trajectory import ThoughtKind, Trajectory, Turn
 from er_gym.tasks import verbs
 
@@ -32,7 +33,8 @@ class NoteWords(BaseModel):
         far: follows for a thing in view or seen before that the agent cannot navigate to; ``""``
             where notes do not tell that.
         at: for a thing in view or seen before that lies or lay in or on another, ``{place}``;
-            ``""`` where notes do not tell that.
+            ``""`` where notes do not tell that. ``at_far``: the same where the agent cannot
+            navigate to that one, either; ``""`` if it is told as ``at``.
         looked: the places searched for it, ``{places}``; ``""`` where notes do not tell them;
             ``times``: how a place is named that was searched more than once, with ``{place}`` and
             ``{count}``.
@@ -56,6 +58,7 @@ class NoteWords(BaseModel):
     unseen: str
     far: str = ""
     at: str = ""
+    at_far: str = ""
     looked: str
     times: str
     again: str = ""
@@ -97,8 +100,8 @@ def note(words: NoteWords, trajectory: Trajectory, index: int) -> tuple[ThoughtK
         told = getattr(words, how_far).replace("{thing}", wanted)
         if how_far in ("view", "seen"):
             told += words.far if wanted not in known.navigable else ""
-            place = known.lay.get(wanted)
-            told += words.at.replace("{place}", place) if place else ""
+            place = known.lay.get(wanted, "")
+            told += lying_text(words.at, words.at_far, place, known.navigable)
         parts += [goal, told]
     looked = [
         place

@@ -9,8 +9,8 @@ often it was there and how many of them it has seen in one view.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 from pydantic import BaseModel, ConfigDict
@@ -28,6 +28,8 @@ class PlaceWords(BaseModel):
         told: lists them, ``{places}``.
         times: a place where it has been, with ``{place}`` and how often, ``{count}``.
         times_of_several: the same of a type of which it has seen ``{number}`` in one view.
+        opened: follows for a place that it has opened, ``{count}`` times; ``""`` if that is not
+            told.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -35,6 +37,7 @@ class PlaceWords(BaseModel):
     told: str
     times: str
     times_of_several: str
+    opened: str = ""
 
 
 @dataclass(frozen=True)
@@ -45,12 +48,13 @@ class Recalled:
     Attributes:
         lay: on what it lay when it was in view last, or where the agent has put it since; ``""``
             for what was seen on nothing. What was sliced is forgotten.
-        visits: how often the agent went there.
+        visits: how often the agent went there; ``opened``: how often it opened one.
         most_in_view: how many of them were in one view, at most.
     """
 
     lay: Mapping[str, str] = field(default_factory=dict)
     visits: Mapping[str, int] = field(default_factory=dict)
+    opened: Mapping[str, int] = field(default_factory=dict)
     most_in_view: Mapping[str, int] = field(default_factory=dict)
 
     def having_done(self, action: Action | None, success: bool, held: str) -> Recalled:
@@ -63,14 +67,17 @@ class Recalled:
         """
         if action is None or not success:
             return self
-        lay, visits, there = {**self.lay}, {**self.visits}, action.object_type
+        lay, there = {**self.lay}, action.object_type
+        visits, opened = {**self.visits}, {**self.opened}
         if action.verb == verbs.NAVIGATE:
             visits[there] = visits.get(there, 0) + 1
+        elif action.verb == verbs.OPEN:
+            opened[there] = opened.get(there, 0) + 1
         elif action.verb == verbs.PUT and held:
             lay[held] = there
         elif action.verb == verbs.SLICE:
             lay.pop(there, None)
-        return Recalled(lay, visits, self.most_in_view)
+        return Recalled(lay, visits, opened, self.most_in_view)
 
     def having_seen(
         self, view: Sequence[SeenObject], views: Mapping[str, Sequence[SeenObject]]
@@ -79,7 +86,8 @@ class Recalled:
         most = Counter(self.most_in_view)
         for each in (view, *views.values()):  # views overlap
             most |= Counter(one.type for one in each)
-        return Recalled({**self.lay, **where_each_lies(view, views)}, self.visits, most)
+        lay = {**self.lay, **where_each_lies(view, views)}
+        return replace(self, lay=lay, most_in_view=most)
 
 
 def where_each_lies(
@@ -91,6 +99,19 @@ def where_each_lies(
     return {one.type: one.on for one in (*reversed(around), *reversed(view))}
 
 
+def lying_text(at: str, at_far: str, place: str, navigable: Collection[str]) -> str:
+    """In or on what a thing lies, in words of a dialect.
+
+    Args:
+        at: the words, with ``{place}``.
+        at_far: those for a place that the agent cannot navigate to; ``""`` if they are ``at``.
+        place: its type; ``""`` for nothing, of which nothing is told.
+        navigable: the types that it can navigate to.
+    """
+    words = at if place in navigable else at_far or at
+    return words.replace("{place}", place) if place else ""
+
+
 def places_text(words: PlaceWords, navigable: Iterable[str], recalled: Recalled) -> str:
     """The places that the agent can go to, in a line; ``""`` for none.
 
@@ -99,11 +120,14 @@ def places_text(words: PlaceWords, navigable: Iterable[str], recalled: Recalled)
 
     def place(name: str) -> str:
         count, number = recalled.visits.get(name, 0), recalled.most_in_view.get(name, 0)
-        if not count:
-            return name
-        text = words.times_of_several if number > 1 else words.times
-        filled = text.replace("{place}", name).replace("{count}", str(count))
-        return filled.replace("{number}", str(number))
+        told = name
+        if count:
+            text = words.times_of_several if number > 1 else words.times
+            told = text.replace("{place}", name).replace("{count}", str(count))
+            told = told.replace("{number}", str(number))
+        if opened := recalled.opened.get(name, 0):
+            told += words.opened.replace("{count}", str(opened))
+        return told
 
     told = ", ".join(place(each) for each in navigable if _is_place(each))
     return words.told.replace("{places}", told) if told else ""

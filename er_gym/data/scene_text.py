@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from er_gym.data.recall import Recalled, where_each_lies
+from er_gym.data.recall import Recalled, lying_text, where_each_lies
 from er_gym.data.trajectory import SeenObject, Turn
 from er_gym.envs.actions import Action
 from er_gym.envs.info import action_of, detail
@@ -125,6 +125,8 @@ class NamedWords(BaseModel):
         seen: out of view, but seen before, or an object that the task says it can navigate to;
             ``""`` if that is told as ``hidden``.
         at: for an object in view, or seen, that lies or lay in or on another, ``{place}``.
+        at_far: the same where the agent cannot navigate to that one, either; ``""`` if it is told
+            as ``at``.
         far: follows for an object in view, or seen, that the agent cannot navigate to; ``""`` if
             that is not told.
     """
@@ -137,6 +139,7 @@ class NamedWords(BaseModel):
     view: str
     hidden: str
     at: str
+    at_far: str = ""
     seen: str = ""
     far: str = ""
 
@@ -231,8 +234,7 @@ def named_text(words: NamedWords, named: Sequence[str], now: Perceived) -> str:
         told = words.view if name in in_view else words.seen
         if name not in now.navigable:
             told += words.far
-        place = lay.get(name)
-        return told + (words.at.replace("{place}", place) if place else "")
+        return told + lying_text(words.at, words.at_far, lay.get(name, ""), now.navigable)
 
     told = ", ".join(f"{name} {how_far(name)}" for name in named)
     return words.told.replace("{things}", told) if told else ""

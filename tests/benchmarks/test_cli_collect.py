@@ -216,6 +216,7 @@ def test_failed_episodes_of_a_run_are_corrected(tmp_path: Path, er_gym: ErGym) -
         ("--recipe", "--recipe is for a recipe; --correct RUN collects without one"),
         ("--kinds", "--kinds is for a recipe"),
         ("--suite", f"{run} was played with other tasks than those of "),
+        ("--correct-by", "'mini' cannot take over an episode; give expert, searcher, spotter"),
     ):
         code, _, told = er_gym("collect", "--correct", run, "--out", out, option, "mini")
         assert code == 2
@@ -224,7 +225,7 @@ def test_failed_episodes_of_a_run_are_corrected(tmp_path: Path, er_gym: ErGym) -
     assert code == 2
     assert "correct_after" in told  # the collection has others
     late = tmp_path / "late"
-    after = ("--correct-after", "refusal", "--correct-steps", 60)
+    after: tuple[str | int, ...] = ("--correct-after", "refusal", "--correct-steps", 60)
     told = collect(late, "--correct", run, *after, "--limit", 3, "--workers", 1)
     corrected = trajectories(late)
     assert corrected, told
@@ -234,6 +235,12 @@ def test_failed_episodes_of_a_run_are_corrected(tmp_path: Path, er_gym: ErGym) -
         assert not each.turns[each.correction.first_wrong].success
         assert each.id.endswith(f"-corrected-{each.correction.first_wrong + 1}")  # one of several
     code, shown, told = er_gym("data", "verify", late, "--suite", NAME)
+    assert code == 0, (shown, told)
+    policy = tmp_path / "policy"
+    after = (*after, "--correct-by", "zoo:all-sightings")
+    told = collect(policy, "--correct", run, *after, "--limit", 2, "--workers", 1)
+    assert trajectories(policy), told
+    code, shown, told = er_gym("data", "verify", policy, "--suite", NAME)
     assert code == 0, (shown, told)
     faulty = tmp_path / "faulty"
     code, _, told = er_gym(*given, "--faults", 0.1, "--out", faulty)

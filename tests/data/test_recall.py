@@ -63,19 +63,19 @@ def told(turns: list[Turn]) -> list[list[str]]:
 def test_the_user_tells_where_things_were_seen_and_where_the_agent_has_been() -> None:
     assert told(TURNS) == [
         [
-            "asked Mug in view far at Shelf, Box seen, Pen hidden, Desk seen",
+            "asked Mug in view far at far Shelf, Box seen, Pen hidden, Desk seen",
             "places Box, Desk, Drawer",  # a mirror holds nothing, and a plate is carried
         ],
         [
-            "asked Mug in view far at Shelf, Box seen, Pen in view far, Desk seen",
+            "asked Mug in view far at far Shelf, Box seen, Pen in view far, Desk seen",
             "places Box, Desk, Drawer",
         ],
         [
-            "asked Mug seen far at Shelf, Box seen, Pen seen far, Desk seen",
+            "asked Mug seen far at far Shelf, Box seen, Pen seen far, Desk seen",
             "places Box, Desk, Drawer 1/2",  # the most in one view, since views overlap
         ],
         [  # the walk to the desk failed
-            "asked Mug seen far at Shelf, Box seen, Pen seen far, Desk seen",
+            "asked Mug seen far at far Shelf, Box seen, Pen seen far, Desk seen",
             "places Box, Desk, Drawer 1/2",
         ],
         ["asked Mug held, Box hidden, Pen seen far, Desk seen", "places Desk"],
@@ -97,16 +97,16 @@ def noted(turns: list[Turn], index: int) -> str:
 def test_a_note_says_where_the_thing_was_seen_and_not_where_one_has_looked() -> None:
     """In the user's words, so that it can be copied."""
     assert [noted(TURNS, index) for index in (1, 2, 3)] == [
-        "goal pickup Mug to Box; Mug in view far at Shelf",
-        "goal pickup Mug to Box; Mug seen far at Shelf",
-        "failed navigate to Desk; goal pickup Mug to Box; Mug seen far at Shelf",
+        "goal pickup Mug to Box; Mug in view far at far Shelf",
+        "goal pickup Mug to Box; Mug seen far at far Shelf",
+        "failed navigate to Desk; goal pickup Mug to Box; Mug seen far at far Shelf",
     ]
 
 
 def test_a_note_does_not_take_a_sink_for_its_basin() -> None:
     goal = Subgoal(verb=verbs.PUT, thing="Egg", place="SinkBasin")
     view = [sees("SinkBasin", "Sink"), sees("Sink", "CounterTop")]
-    here = turn(GO, "Sink", subgoal=goal, held="Egg", view=view, navigable=["SinkBasin"])
+    here = turn(GO, "Sink", subgoal=goal, held="Egg", view=view, navigable=["SinkBasin", "Sink"])
     assert noted([here], 0) == "goal put in Egg to SinkBasin; SinkBasin in view at Sink"
 
 
@@ -117,8 +117,32 @@ def test_only_what_was_done_is_remembered() -> None:
     assert been.having_done(Action(GO, "Bed"), False, "") == been
     assert been.having_done(Action(PUT, "Bed"), False, "Pen") == been
     assert been.having_done(Action(PUT, "Bed"), True, "Pen").lay == {"Pen": "Bed"}
-    assert been.having_done(Action(verbs.OPEN, "Bed"), True, "") == been
     assert been.having_done(Action(GO, "Bed"), True, "").visits == {"Bed": 2}
+    assert been.having_done(Action(verbs.CLOSE, "Bed"), True, "") == been
+    opened = been.having_done(Action(verbs.OPEN, "Bed"), True, "")
+    assert (opened.opened, opened.visits) == ({"Bed": 1}, been.visits)
+    assert opened.having_done(Action(verbs.OPEN, "Bed"), False, "") == opened
+    assert opened.having_done(Action(verbs.OPEN, "Bed"), True, "").opened == {"Bed": 2}
+
+
+def test_the_user_tells_how_many_were_opened() -> None:
+    opened = [turn(GO, "Drawer"), turn(verbs.OPEN, "Drawer"), turn(verbs.OPEN, "Box"), turn(GO)]
+    seen = [each.model_copy(update={"navigable": KNOWN}) for each in opened]
+    assert [places for _, places in told(seen)] == [
+        "places Box, Desk, Drawer",
+        "places Box, Desk, Drawer 1",
+        "places Box, Desk, Drawer 1 open 1",
+        "places Box open 1, Desk, Drawer 1 open 1",
+    ]
+
+
+def test_a_thing_can_lie_where_one_cannot_go_either() -> None:
+    here = turn(GO, "Bed", view=[sees("Mug", "Shelf")], navigable=["Bed"])
+    there = here.model_copy(update={"navigable": ["Bed", "Shelf"]})
+    assert told([here])[0][0].startswith("asked Mug in view far at far Shelf,")
+    assert noted([here], 0) == "goal pickup Mug to Box; Mug in view far at far Shelf"
+    assert told([there])[0][0].startswith("asked Mug in view far at Shelf,")
+    assert noted([there], 0) == "goal pickup Mug to Box; Mug in view far at Shelf"
 
 
 def test_what_was_sliced_is_forgotten() -> None:

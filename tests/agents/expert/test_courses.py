@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from itertools import pairwise
 from random import Random
-from typing import Literal
 
 import pytest
 from expert_courses import (
@@ -24,8 +24,10 @@ from agents.expert.corrections import Beginning, first_mistake
 from agents.expert.explorer import Strength
 from agents.expert.legs import legs_of
 from agents.expert.places import draw_places, likely_places, plan_of
+from agents.expert.prescreen import SilentAgent
 from agents.expert.recipe import load_recipe
-from agents.expert.takeover import goals_left
+from agents.expert.recorder import joined_modes
+from agents.expert.successors import PolicyTakesOver, check_corrector, goals_left, successor
 from agents.scripted.searcher import instruction as words
 from agents.scripted.searcher import search_priors
 from agents.scripted.searcher.instruction import Goal
@@ -33,6 +35,7 @@ from er_gym.data.course_checks import are_key_actions
 from er_gym.data.trajectory import Subgoal
 from er_gym.envs.actions import Action
 from er_gym.envs.embodied_env import EmbodiedEnv
+from er_gym.rollout.play import episode_seed, play_episode
 from er_gym.tasks import verbs
 from er_gym.tasks.equivalence import same_type
 from er_gym.tasks.task import KeyAction, type_of_id
@@ -352,9 +355,7 @@ def test_a_correction_can_begin_after_a_failure(env: EmbodiedEnv) -> None:
 
 
 @pytest.mark.parametrize("searcher", ["searcher", "spotter"])
-def test_a_searcher_takes_over_a_failed_episode(
-    env: EmbodiedEnv, searcher: Literal["searcher", "spotter"]
-) -> None:
+def test_a_searcher_takes_over_a_failed_episode(env: EmbodiedEnv, searcher: str) -> None:
     part = RECIPE.parts["corrections"]
     corrected, as_the_searcher = 0, searcher == "spotter"
     for candidate in of_each_type(part, 4):
@@ -381,6 +382,42 @@ def test_a_searcher_takes_over_a_failed_episode(
         corrected += 1
     assert corrected > 8
     assert not as_the_searcher
+
+
+def test_a_policy_goes_on_from_its_own_beginning_as_it_would_have() -> None:
+    """So it has seen all that the episode saw before it takes over."""
+    pytest.importorskip("torch")
+    name = "zoo:all-sightings"
+    policy = successor(name)
+    assert isinstance(policy, PolicyTakesOver)
+    modes = joined_modes(SilentAgent.obs_mode, policy.observes)
+    took_over = 0
+    with closing(environment(obs_mode=modes)) as env:
+        for candidate in of_each_type(EXPERTS, 1):
+            seed = episode_seed(SEED, candidate.id)
+            whole = play_episode(env, policy.policy, candidate.played_task, seed)
+            actions = [Action(step.verb, step.object_type) for step in whole.steps[1:]]
+            begun = Beginning(tuple(actions[: len(actions) // 2]))
+            one = play(env, replace(candidate, beginning=begun, correct_by=name))
+            assert [intent.action for intent in one.intents] == actions
+            assert [intent.train for intent in one.intents] == [
+                index >= len(begun.actions) for index in range(len(actions))
+            ]
+            took_over += len(begun.actions) > 2
+    assert took_over > 5
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("spoter", "give expert, searcher, spotter, or zoo:NAME"),
+        ("zoo:all-sighting", "did you mean all-sightings"),
+        ("zoo:er-tiny-vl", "it is a language model, not a policy"),
+    ],
+)
+def test_who_cannot_take_over_is_told(name: str, why: str) -> None:
+    with pytest.raises(ValueError, match=why):
+        check_corrector(name)
 
 
 def test_the_searcher_leaves_alone_what_is_done(env: EmbodiedEnv) -> None:

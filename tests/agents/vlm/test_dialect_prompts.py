@@ -283,7 +283,7 @@ def test_settings_that_do_not_fit_a_dialect(tmp_path: Path) -> None:
     assert texts.named is not None
     assert texts.notes is not None
     named = texts.named.model_copy(update={"seen": "seen"})
-    notes = texts.notes.model_copy(update={"at": "at"})
+    notes = texts.notes.model_copy(update={"at_far": "at far"})
     for more in ({"named": named}, {"notes": notes}):
         assert digest_of(texts.model_copy(update=more)) != digest_of(texts)
     assert load_prompts(mine()).digest == digest
