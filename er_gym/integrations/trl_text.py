@@ -7,7 +7,7 @@ The model writes its action in a reply, in a dialect of er-gym's training files,
         model,
         reward_funcs=earned,
         train_dataset=Dataset.from_list(text_rows(tasks)),
-        rollout_func=TextRollouts("mini", instances="explore"),
+        rollout_func=TextRollouts("mini", dialect="text-recall", instances="explore"),
         ...
     )
 
