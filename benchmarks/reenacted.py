@@ -89,7 +89,7 @@ class Attempt:
         if not self._left:
             return {}
         self._left -= 1
-        self._course.view = View.of({}, info)
+        self._course.view = View.of({}, info)  # explorers observe nothing besides
         if self._intents is None:
             self._intents = self._course.intents()
         action = next(self._intents).action

@@ -22,7 +22,7 @@ from agents.expert.players import PlaySettings, header_of
 from agents.expert.prescreen import ATTEMPT
 from agents.expert.recipe import Recipe
 from agents.expert.replayed import ReplayedCourse
-from agents.expert.successors import RecordedTakesOver
+from agents.expert.successors import EXPERT, RecordedTakesOver, check_corrector
 from agents.expert.takeover import TakeoverCourse
 from agents.expert.thinker import ThinkingAgent
 from agents.expert.thought_kinds import ThoughtKinds
@@ -205,7 +205,7 @@ class Told:
             explorer=drawn.explorer,
             strength=row.explorers.get(drawn.explorer) if beginning is None else None,
             beginning=beginning,
-            correct_by=self.settings.get("correct_by", "expert"),
+            correct_by=str(self.settings.get("correct_by", EXPERT)),
             run=said.run if said else "",
             episode=said.episode if said else "",
             repeats=row.repeats,
@@ -237,11 +237,17 @@ def _settings_of(stated: str) -> Told:
     try:
         kinds = ThoughtKinds.model_validate(settings["thoughts"])
         play = PlaySettings(kinds, None, settings["language"])
+        check_corrector(str(settings.get("correct_by", EXPERT)))
         return Told(settings, Recipe.model_validate(settings["recipe"]), play)
     except ValidationError as error:
         raise CollectionError(
             f"this er-gym does not know the settings of the collection ({first_problem(error)}); "
             f"verify it with the one that collected it, {manifest.er_gym}"
+        ) from error
+    except ValueError as error:
+        raise CollectionError(
+            f"the settings of the collection say who corrected it, but {error}; verify it with the "
+            f"er-gym that collected it, {manifest.er_gym}"
         ) from error
 
 

@@ -42,7 +42,7 @@ class Candidate:
         explorer: the name of an explorer's strength.
         strength: how well the explorer plays.
         beginning: of the failed episode that is corrected.
-        correct_by: who corrects it, see :data:`agents.expert.successors.CORRECTORS`.
+        correct_by: who corrects it, see :func:`agents.expert.successors.check_corrector`.
         run: where the failed episode is, ``episode`` its key there. Of an episode that is replayed:
             the path of its run.
         repeats: the share of actions that are repeated without need.

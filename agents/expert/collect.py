@@ -210,7 +210,7 @@ def correction_strata(
         run_directory: the run.
         limit: how many trajectories in all; None for as many as there are.
         after: the action after which another agent takes over.
-        by: the agent that takes over (:data:`agents.expert.successors.CORRECTORS`).
+        by: the agent that takes over (:func:`agents.expert.successors.check_corrector`).
         max_steps: the step limit of the corrections; None for that of the episodes.
         own_thoughts_in: the language of the collection, if what its trajectories repeat is to keep
             the thoughts of the agent that failed.
@@ -381,8 +381,10 @@ class Collector:
     @property
     def _obs_mode(self) -> str:
         """What the players need to observe, without pictures if none are recorded."""
-        modes = joined_modes(self._players.obs_mode, self._settings.corrector_observes)
-        return modes if self._settings.play.pictures else modes.replace("rgb+", "", 1)
+        modes = self._players.obs_mode.split("+")
+        if self._settings.play.pictures is None:
+            modes.remove("rgb")
+        return joined_modes(*modes, self._settings.corrector_observes)
 
     def _choose_enough(self, strata: Sequence[Stratum], env: Mapping[str, Any], most: int) -> None:
         """Choose candidates to be played until there are enough, or no more."""

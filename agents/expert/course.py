@@ -33,7 +33,7 @@ class Intent:
 
 @dataclass(frozen=True)
 class View:
-    """What a course reads after a step: parts of ``info``, and all of it."""
+    """What a course reads after a step: parts of ``info``, then all of it, and the observation."""
 
     visible: frozenset[str]
     held: str
@@ -50,7 +50,7 @@ class View:
 
     @classmethod
     def of(cls, obs: Mapping[str, Any], info: Mapping[str, Any]) -> View:
-        """Read ``info`` with its details."""
+        """Read an observation, and ``info`` with its details."""
         return cls(
             visible=frozenset(detail(info, "visible")),
             held=info["held"],

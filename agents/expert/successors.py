@@ -1,4 +1,5 @@
-"""Who can take over a failed episode: a searcher, or a policy of the zoo.
+"""Who can take over a failed episode: a searcher, or a policy of the zoo; or, to check the records
+of one, what such an agent did.
 
 The episode itself is :mod:`agents.expert.takeover`'s.
 """
@@ -13,7 +14,7 @@ from agents import make_agent
 from agents.expert.course import View
 from agents.scripted.searcher import SearcherAgent, SpotterAgent, instruction
 from agents.scripted.searcher.instruction import Goal
-from agents.zoo.index import PREFIX, ZooModel, find_model
+from agents.zoo.index import PREFIX, find_model
 from er_gym.envs.actions import Action
 from er_gym.rollout.agent import Agent, CanBeOverruled, Decision
 from er_gym.tasks import verbs
@@ -78,15 +79,15 @@ class SearcherTakesOver:
         return _action(self.searcher.act({}, view.info))
 
 
-class Policy(Agent, CanBeOverruled, Protocol):
-    """An agent that has followed an episode in which another one acted."""
+class Follower(Agent, CanBeOverruled, Protocol):
+    """An agent that can follow an episode in which another one acts."""
 
 
 @dataclass(frozen=True)
 class PolicyTakesOver:
     """A policy, such as :class:`agents.rl.agent.RLAgent`, as :class:`Successor`."""
 
-    policy: Policy
+    policy: Follower
 
     @property
     def observes(self) -> str:
@@ -145,17 +146,16 @@ def successor(name: str) -> Successor:
     """Who takes over: a searcher, or a policy of the zoo.
 
     Args:
-        name: of one of :data:`CORRECTORS` but the expert, or ``zoo:NAME``.
+        name: one of :data:`SEARCHERS`, or ``zoo:NAME``.
 
     Raises:
         ValueError: the zoo has no such policy, or it cannot be loaded.
     """
     if name in SEARCHERS:
         return SearcherTakesOver(SEARCHERS[name]())
-    zoo_policy(name)
-    policy = make_agent(name)
+    policy = make_agent(check_corrector(name))
     assert isinstance(policy, CanBeOverruled)
-    return PolicyTakesOver(cast(Policy, policy))
+    return PolicyTakesOver(cast(Follower, policy))
 
 
 def check_corrector(name: str) -> str:
@@ -165,25 +165,15 @@ def check_corrector(name: str) -> str:
         ValueError: there is none; the message says who there is.
     """
     if name.startswith(PREFIX):
-        zoo_policy(name)
+        kind = find_model(name.removeprefix(PREFIX)).card.kind
+        if kind != "policy":
+            raise ValueError(f"{name} does not take over: it is a {kind}, not a policy")
     elif name not in CORRECTORS:
         raise ValueError(
             f"{name!r:.80} cannot take over an episode; give {', '.join(CORRECTORS)}, or "
             f"{PREFIX}NAME, a policy of the zoo"
         )
     return name
-
-
-def zoo_policy(name: str) -> ZooModel:
-    """A policy of the zoo, by its name ``zoo:NAME``.
-
-    Raises:
-        ValueError: the zoo has no model of this name, or it is no policy.
-    """
-    model = find_model(name.removeprefix(PREFIX))
-    if model.card.kind != "policy":
-        raise ValueError(f"{name} does not take over: it is a {model.card.kind}, not a policy")
-    return model
 
 
 def goals_left(goals: Iterable[Goal], done: Iterable[KeyAction]) -> list[Goal]:

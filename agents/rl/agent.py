@@ -95,7 +95,7 @@ class RLAgent:
         return Decision(ACTIONS[self._policy.best(self._see(obs, info), info["action_mask"])])
 
     def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-        """A person decides this step; the observation before it is remembered as usual."""
+        """Another decides this step; the observation before it is remembered as usual."""
         self._see(obs, info)
 
     def _see(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Obs:

@@ -126,7 +126,7 @@ class VLMAgent:
                 self._over_limit = self._over_limit or str(refusal)
 
     def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-        """A person decides this step. The conversation goes on as if the model had decided it."""
+        """Another decides this step. The conversation goes on as if the model had decided it."""
         self._messages.append(self._turn(obs, info))
         self._read(in_form(action, self._settings.decide), info, by=PERSON)
 

@@ -97,12 +97,15 @@ def dialect_prompts(dialect: str, language: Language) -> DialectPrompts:
     )
 
 
-_ADDED_WORDS = {
-    "named": ("seen", "far", "at_far"),
-    "notes": ("far", "at", "at_far"),
-    "places": ("opened",),
-}
-"""Words that older versions did not have; ``""`` where a dialect does not use them."""
+_ADDED_WORDS = (
+    ("named", ("seen", "far")),
+    ("notes", ("far", "at")),
+    ("named", ("at_far",)),
+    ("notes", ("at_far",)),
+    ("places", ("opened",)),
+)
+"""Words that older versions did not have, by the version that has them: ``""`` where a dialect
+does not use them."""
 
 
 def digest_of(texts: DialectTexts) -> str:
@@ -111,10 +114,10 @@ def digest_of(texts: DialectTexts) -> str:
     left_out: dict[str, Any] = {"frames": True}
     left_out |= {"scene_by": True} if texts.scene_by == "user" else {}
     left_out |= {name: True for name in ("named", "places") if getattr(texts, name) is None}
-    for name, words in _ADDED_WORDS.items():
+    for name, words in _ADDED_WORDS:
         told = getattr(texts, name)
-        if told is not None and (unused := {word for word in words if not getattr(told, word)}):
-            left_out[name] = unused
+        if told is not None and not any(getattr(told, word) for word in words):
+            left_out.setdefault(name, set()).update(words)
     digest = hashlib.sha256(texts.model_dump_json(exclude=left_out).encode())
     if verbs.ADDED:
         digest.update(repr(verbs.ADDED).encode())

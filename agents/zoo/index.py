@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -100,6 +101,22 @@ def resolved(agent: str) -> str:
 def files_of(folder: Path) -> Iterator[Path]:
     """The files in a model's folder, at whatever depth."""
     return (file for file in sorted(folder.rglob("*")) if not file.is_dir())
+
+
+def weights_of(agent: str) -> dict[str, str]:
+    """What tells the weights behind the name ``zoo:NAME`` from others: ``{"weights": DIGEST}``, the
+    sha256 in hex of the files by which it plays; empty for another agent.
+
+    Raises:
+        ValueError: as :func:`find_model`.
+    """
+    if not agent.startswith(PREFIX):
+        return {}
+    total = hashlib.sha256()
+    for file in files_of(find_model(agent.removeprefix(PREFIX)).folder):
+        if file.name != CARD:
+            total.update(file.read_bytes())
+    return {"weights": total.hexdigest()}
 
 
 @lru_cache(maxsize=32)

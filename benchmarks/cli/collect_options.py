@@ -95,7 +95,8 @@ class CollectOptions(OptionGroup):
     correct_by: str | None = option(
         metavar="[expert|searcher|spotter|zoo:NAME]",
         help="With --correct: which agent takes over; zoo:NAME is a policy of the zoo, such as "
-        "zoo:all-sightings. All but the expert know only what the failed agent knew.  "
+        "zoo:all-sightings (er-gym zoo lists them), and needs er-gym[rl]. All but the expert know "
+        "only what the failed episode has seen, and a policy which actions are possible.  "
         "[default: expert]",
     )
     correct_steps: int | None = option(

@@ -26,15 +26,27 @@ def _name_of(run: Path) -> str:
     return f"{run.resolve().name} ({RunDirectory.open(run).manifest.digest})"
 
 
+def _corrector(options: CollectOptions) -> str:
+    """Who takes over failed episodes."""
+    from agents.expert.successors import EXPERT, check_corrector
+
+    return EXPERT if options.correct_by is None else check_corrector(options.correct_by)
+
+
 def _stated_corrections(options: CollectOptions) -> dict[str, Any]:
     """How it is corrected, for the manifest, which does not state the paper's way."""
+    from agents.expert.successors import EXPERT
+    from agents.zoo.index import weights_of
+
+    by = _corrector(options)
     stated = {
         "correct_after": options.correct_after,
-        "correct_by": options.correct_by,
+        "correct_by": by,
         "own_thoughts": options.own_thoughts,
     }
-    usual = (None, "wrong", "expert", False)
-    return {name: given for name, given in stated.items() if given not in usual}
+    usual = (None, "wrong", EXPERT, False)
+    weights = {f"corrector_{name}": digest for name, digest in weights_of(by).items()}
+    return {**{name: given for name, given in stated.items() if given not in usual}, **weights}
 
 
 def settings_of(
@@ -50,7 +62,7 @@ def settings_of(
     """What decides the trajectories, and the manifest that states it."""
     from agents.expert.collect import CollectSettings, corrections_recipe
     from agents.expert.players import PlaySettings
-    from agents.expert.successors import EXPERT, check_corrector, successor
+    from agents.expert.successors import EXPERT, successor
     from agents.expert.thought_kinds import load_thought_kinds
     from agents.vlm.settings import Pictures
     from er_gym import __version__
@@ -91,7 +103,7 @@ def settings_of(
         seed=seed,
         er_gym=__version__,
     )
-    by = options.correct_by or EXPERT
+    by = _corrector(options)
     settings = CollectSettings(
         recipe=stated,
         tasks=tasks,
@@ -99,7 +111,7 @@ def settings_of(
         play=PlaySettings(kinds, pictures, options.language),
         seed=seed,
         manifest=manifest.model_dump(mode="json"),
-        corrector_observes="" if check_corrector(by) == EXPERT else successor(by).observes,
+        corrector_observes="" if by == EXPERT else successor(by).observes,
     )
     return settings, manifest
 
@@ -120,7 +132,7 @@ def candidates(
             for stratum in wanted.values():
                 stratum.sequence = ModelCandidates(stratum.sequence, model.run.name)
         return wanted, {}
-    after, by = options.correct_after or "wrong", options.correct_by or "expert"
+    after, by = options.correct_after or "wrong", _corrector(options)
     run = RunDirectory.open(correct)
     if after == "refusal" and run.manifest.env.get("faults"):
         raise BadInput(

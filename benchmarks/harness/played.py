@@ -5,7 +5,6 @@ They are played in this process, in run directories that :mod:`er_gym.rollout.ru
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -16,7 +15,7 @@ from agents import make_agent
 from agents.factory import AgentFactory, comparable_settings, is_model_agent, load_settings
 from agents.vlm.clients.registry import settings_file
 from agents.vlm.prompts import prompts_for
-from agents.zoo.index import CARD, PREFIX, files_of, find_model
+from agents.zoo.index import weights_of
 from er_gym import __version__
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.rollout.agent import Agent
@@ -105,7 +104,7 @@ def _maker(
 ) -> Iterator[tuple[Callable[[int], Agent], dict[str, Any], dict[str, Any]]]:
     """What makes an agent from a seed, the environment's arguments that it asks for, and what
     decides how it plays, beside its name; that is empty for agents that are no models."""
-    weights = _weights(agent)
+    weights = weights_of(agent)
     if not is_model_agent(agent):
         yield (
             (lambda seed: make_agent(agent, seed)),
@@ -120,14 +119,3 @@ def _maker(
         yield factory.agent, settings.env, {**told, **weights}
     finally:
         factory.close()
-
-
-def _weights(agent: str) -> dict[str, str]:
-    """The digest of the files by which a zoo model plays; nothing for another agent."""
-    if not agent.startswith(PREFIX):
-        return {}
-    total = hashlib.sha256()
-    for file in files_of(find_model(agent.removeprefix(PREFIX)).folder):
-        if file.name != CARD:
-            total.update(file.read_bytes())
-    return {"weights": total.hexdigest()}

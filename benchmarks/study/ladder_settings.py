@@ -71,7 +71,7 @@ class Sampled(StrictSettings):
         limit: the most trajectories that are taken; None for all.
         correct_after: of its failures, after which action the expert takes over
             (:data:`agents.expert.corrections.CorrectAfter`).
-        correct_by: who takes over (:data:`agents.expert.successors.CORRECTORS`).
+        correct_by: who takes over (:func:`agents.expert.successors.check_corrector`).
         own_thoughts: whether what a correction repeats keeps the thoughts of the agent that failed.
         successes: in the third stage, whether its successes are learnt from, too; those with
             failed actions among them, but for the failed turns.

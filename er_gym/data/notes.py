@@ -33,8 +33,8 @@ class NoteWords(BaseModel):
         far: follows for a thing in view or seen before that the agent cannot navigate to; ``""``
             where notes do not tell that.
         at: for a thing in view or seen before that lies or lay in or on another, ``{place}``;
-            ``""`` where notes do not tell that. ``at_far``: the same where the agent cannot
-            navigate to that one, either; ``""`` if it is told as ``at``.
+            ``""`` where notes do not tell that. ``at_far``: the same for a place that the agent
+            cannot navigate to; ``""`` if it is told as ``at``.
         looked: the places searched for it, ``{places}``; ``""`` where notes do not tell them;
             ``times``: how a place is named that was searched more than once, with ``{place}`` and
             ``{count}``.

@@ -2,8 +2,9 @@
 
 A model of a few million weights forgets what it saw in passing, and goes to places that it cannot
 reach yet. A dialect with words for it tells the model: ``asked Mug seen at Shelf`` for a mug that
-is out of view, and ``places Drawer 2/5, Shelf, Sofa 1`` for the places that it can go to, with how
-often it was there and how many of them it has seen in one view.
+is out of view (``at far Shelf`` if it cannot go to the shelf), and ``places Drawer 2/5 open 1,
+Shelf, Sofa 1`` for the places that it can go to, with how often it was there, how many of them it
+has seen in one view, and how often it opened one.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ class PlaceWords(BaseModel):
         told: lists them, ``{places}``.
         times: a place where it has been, with ``{place}`` and how often, ``{count}``.
         times_of_several: the same of a type of which it has seen ``{number}`` in one view.
-        opened: follows for a place that it has opened, ``{count}`` times; ``""`` if that is not
-            told.
+        opened: follows for a place of which it has opened one ``{count}`` times, the same or
+            others; ``""`` if that is not told.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -104,7 +105,7 @@ def lying_text(at: str, at_far: str, place: str, navigable: Collection[str]) -> 
 
     Args:
         at: the words, with ``{place}``.
-        at_far: those for a place that the agent cannot navigate to; ``""`` if they are ``at``.
+        at_far: those for a place that the agent cannot navigate to; ``""`` for the same.
         place: its type; ``""`` for nothing, of which nothing is told.
         navigable: the types that it can navigate to.
     """

@@ -125,8 +125,8 @@ class NamedWords(BaseModel):
         seen: out of view, but seen before, or an object that the task says it can navigate to;
             ``""`` if that is told as ``hidden``.
         at: for an object in view, or seen, that lies or lay in or on another, ``{place}``.
-        at_far: the same where the agent cannot navigate to that one, either; ``""`` if it is told
-            as ``at``.
+        at_far: the same for a place that the agent cannot navigate to; ``""`` if it is told as
+            ``at``.
         far: follows for an object in view, or seen, that the agent cannot navigate to; ``""`` if
             that is not told.
     """

@@ -115,10 +115,10 @@ def check_observation(agent: Agent, obs: Mapping[str, Any]) -> None:
 
 @runtime_checkable
 class CanBeOverruled(Protocol):
-    """An agent that can continue after a person has decided a step in its place."""
+    """An agent that can continue after another, or a person, has decided a step in its place."""
 
     def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
-        """A person decides this step; called in place of ``act``, with its arguments.
+        """Another decides this step; called in place of ``act``, with its arguments.
 
         The next ``act`` gets the result, as if the agent had decided it.
         """

@@ -21,6 +21,7 @@ from small_suite import NAME, small
 from support import ROOT
 
 from agents.expert.acceptance import PlayedCourse, rejection
+from agents.zoo.index import weights_of
 from benchmarks.cli.main import cli as command
 from er_gym.data.collection import Collection
 from er_gym.data.trajectory import Trajectory
@@ -240,8 +241,27 @@ def test_failed_episodes_of_a_run_are_corrected(tmp_path: Path, er_gym: ErGym) -
     after = (*after, "--correct-by", "zoo:all-sightings")
     told = collect(policy, "--correct", run, *after, "--limit", 2, "--workers", 1)
     assert trajectories(policy), told
+    settings = Collection.open(policy).manifest.settings
+    assert settings["correct_by"] == "zoo:all-sightings"
+    assert settings["corrector_weights"] == weights_of("zoo:all-sightings")["weights"]
     code, shown, told = er_gym("data", "verify", policy, "--suite", NAME)
     assert code == 0, (shown, told)
+    told = collect(policy, "--correct", run, *after, "--limit", 2, "--workers", 1)
+    assert "; 0 episodes played now" in told
+    other = (*after[:-1], "spotter")
+    code, _, told = er_gym("collect", "--correct", run, *other, "--limit", 2, "--out", policy)
+    assert code == 2
+    assert "correct_by" in told
+    files = [policy / "collection.json", *policy.glob("parts/*/run.json")]
+    told_by = '"correct_by":"zoo:all-sightings"'
+    texts = {file: file.read_text().replace('"correct_by": ', '"correct_by":') for file in files}
+    assert all(told_by in text for text in texts.values())
+    for odd in ("nope", "zoo:nope", "zoo:er-tiny-vl", "", 5, ["x"]):
+        for file, text in texts.items():
+            file.write_text(text.replace(told_by, f'"correct_by":{json.dumps(odd)}'))
+        code, shown, told = er_gym("data", "verify", policy, "--suite", NAME)
+        assert code == 2, (odd, shown, told)
+        assert "say who corrected it, but" in told, (odd, shown, told)
     faulty = tmp_path / "faulty"
     code, _, told = er_gym(*given, "--faults", 0.1, "--out", faulty)
     assert code == 0, told

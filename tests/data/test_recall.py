@@ -84,14 +84,17 @@ def test_the_user_tells_where_things_were_seen_and_where_the_agent_has_been() ->
     ]
 
 
-def noted(turns: list[Turn], index: int) -> str:
-    whole = Trajectory(
+def trajectory(turns: list[Turn]) -> Trajectory:
+    return Trajectory(
         id="x", task_id="x", task_type="pickup_and_put", scene="FloorPlan1", instruction=TASK,
         name="", key_actions=[], seed=0, kind="a", actor="expert", max_steps=9, turns=turns,
         success=True, end_reason="end",
     )  # fmt: skip
+
+
+def noted(turns: list[Turn], index: int) -> str:
     assert TEXTS.notes is not None
-    return note(TEXTS.notes, whole, index)[1]
+    return note(TEXTS.notes, trajectory(turns), index)[1]
 
 
 def test_a_note_says_where_the_thing_was_seen_and_not_where_one_has_looked() -> None:
@@ -125,7 +128,7 @@ def test_only_what_was_done_is_remembered() -> None:
     assert opened.having_done(Action(verbs.OPEN, "Bed"), True, "").opened == {"Bed": 2}
 
 
-def test_the_user_tells_how_many_were_opened() -> None:
+def test_the_user_tells_how_often_places_were_opened() -> None:
     opened = [turn(GO, "Drawer"), turn(verbs.OPEN, "Drawer"), turn(verbs.OPEN, "Box"), turn(GO)]
     seen = [each.model_copy(update={"navigable": KNOWN}) for each in opened]
     assert [places for _, places in told(seen)] == [
@@ -136,7 +139,21 @@ def test_the_user_tells_how_many_were_opened() -> None:
     ]
 
 
-def test_a_thing_can_lie_where_one_cannot_go_either() -> None:
+def test_in_chinese() -> None:
+    texts = load_dialect("text-recall").texts["zh"]
+    here = turn(verbs.OPEN, "Drawer", view=[sees("Mug", "Shelf")], navigable=["Drawer"])
+    first = Perceived.at(here)
+    now = Perceived.at(here, here, first)
+    (text,) = user_turn(texts, TASK, None, [], now, first)
+    *_, named, places = str(text).splitlines()
+    assert named.startswith("所求 Mug 可见 远 在远处 Shelf,")
+    assert places == "地点 Drawer 打开 1"
+    whole = trajectory([here]).model_copy(update={"language": "zh"})
+    assert texts.notes is not None
+    assert note(texts.notes, whole, 0)[1] == "目标 pickup Mug 到 Box; Mug 可见 远 在远处 Shelf"
+
+
+def test_a_thing_can_lie_where_one_cannot_go() -> None:
     here = turn(GO, "Bed", view=[sees("Mug", "Shelf")], navigable=["Bed"])
     there = here.model_copy(update={"navigable": ["Bed", "Shelf"]})
     assert told([here])[0][0].startswith("asked Mug in view far at far Shelf,")

@@ -12,6 +12,7 @@ import pytest
 from expert_courses import (
     SEED,
     TASKS,
+    NotedCourse,
     Played,
     environment,
     of_each_type,
@@ -27,7 +28,14 @@ from agents.expert.places import draw_places, likely_places, plan_of
 from agents.expert.prescreen import SilentAgent
 from agents.expert.recipe import load_recipe
 from agents.expert.recorder import joined_modes
-from agents.expert.successors import PolicyTakesOver, check_corrector, goals_left, successor
+from agents.expert.successors import (
+    PolicyTakesOver,
+    RecordedTakesOver,
+    check_corrector,
+    goals_left,
+    successor,
+)
+from agents.expert.takeover import TakeoverCourse
 from agents.scripted.searcher import instruction as words
 from agents.scripted.searcher import search_priors
 from agents.scripted.searcher.instruction import Goal
@@ -405,6 +413,17 @@ def test_a_policy_goes_on_from_its_own_beginning_as_it_would_have() -> None:
             ]
             took_over += len(begun.actions) > 2
     assert took_over > 5
+
+
+def test_who_takes_over_and_tries_again_what_was_refused_means_to(env: EmbodiedEnv) -> None:
+    beginning, refused = Action(verbs.OBSERVE), Action(verbs.PICKUP, "Safe")
+    actions = [refused, refused, Action(verbs.OBSERVE), refused, Action(verbs.END)]
+    course = TakeoverCourse(TASKS[0], [beginning], RecordedTakesOver(actions))
+    noted = NotedCourse(course)
+    play_episode(env, SilentAgent(noted), TASKS[0], SEED)
+    intents = [intent for intent, _ in noted.noted]
+    assert [intent.action for intent in intents] == [beginning, *actions]
+    assert [intent.purpose == "retry" for intent in intents] == [False] * 2 + [True] + [False] * 3
 
 
 @pytest.mark.parametrize(

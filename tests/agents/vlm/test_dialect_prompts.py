@@ -283,9 +283,23 @@ def test_settings_that_do_not_fit_a_dialect(tmp_path: Path) -> None:
     assert texts.named is not None
     assert texts.notes is not None
     named = texts.named.model_copy(update={"seen": "seen"})
-    notes = texts.notes.model_copy(update={"at_far": "at far"})
-    for more in ({"named": named}, {"notes": notes}):
-        assert digest_of(texts.model_copy(update=more)) != digest_of(texts)
+    for word in ("at", "at_far"):
+        notes = texts.notes.model_copy(update={word: "at"})
+        for more in ({"named": named}, {"notes": notes}):
+            assert digest_of(texts.model_copy(update=more)) != digest_of(texts)
+    recall = load_dialect("text-recall").texts["en"]
+    none = {"at_far": "", "opened": ""}  # as it was before it had these words
+    before = recall.model_copy(
+        update={
+            name: words.model_copy(update={k: v for k, v in none.items() if hasattr(words, k)})
+            for name in ("named", "notes", "places")
+            if (words := getattr(recall, name))
+        }
+    )
+    assert digest_of(before).startswith("4ed776f5e723")
+    for name, word in (("named", "at_far"), ("notes", "at_far"), ("places", "opened")):
+        one = getattr(before, name).model_copy(update={word: "x"})
+        assert digest_of(before.model_copy(update={name: one})) != digest_of(before)
     assert load_prompts(mine()).digest == digest
     (tmp_path / "en.yaml").write_text(english.replace("Task:", "Job:"))
     assert load_prompts(mine()).digest != digest
