@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from er_gym.data.trajectory import Purpose, Subgoal
@@ -46,7 +46,7 @@ class View:
     left: tuple[KeyAction, ...]
     steps_left: int
     info: Mapping[str, Any]
-    obs: Mapping[str, Any]
+    obs: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, obs: Mapping[str, Any], info: Mapping[str, Any]) -> View:
