@@ -20,7 +20,7 @@ from agents.expert.explorer import ExplorerCourse, Strength
 from agents.expert.kinds import ORDERED_KIND, draw_mode
 from agents.expert.places import DrawnPlaces, PlaceChooser
 from agents.expert.recipe import ANOMALY, CORRECTED, EXPLORED, SEARCH, Part
-from agents.expert.successors import successor
+from agents.expert.successors import EXPERT, successor
 from agents.expert.takeover import TakeoverCourse
 from agents.expert.thought_kinds import ThoughtKinds
 from er_gym.tasks.task import Task
@@ -59,7 +59,7 @@ class Candidate:
     explorer: str = ""
     strength: Strength | None = None
     beginning: Beginning | None = None
-    correct_by: str = "expert"
+    correct_by: str = EXPERT
     run: str = ""
     episode: str = ""
     repeats: float = 0.0
@@ -85,7 +85,7 @@ class Candidate:
         random = Random(seed)
         task = self.played_task
         check = kinds.draw_check(task, random)
-        if self.beginning is not None and self.correct_by != "expert":
+        if self.beginning is not None and self.correct_by != EXPERT:
             return TakeoverCourse(task, self.beginning.actions, successor(self.correct_by))
         if self.beginning is not None:
             return CorrectedCourse(task, self.beginning.actions, random, check)

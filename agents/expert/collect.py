@@ -26,6 +26,7 @@ from agents.expert.prescreen import prescreen
 from agents.expert.recipe import CORRECTED, Part, Recipe, quotas
 from agents.expert.recorded_replies import recorded_replies
 from agents.expert.recorder import joined_modes
+from agents.expert.successors import EXPERT
 from er_gym.data.collection import Collection, CollectionError
 from er_gym.data.trajectory import Language, Trajectory
 from er_gym.envs.actions import Action
@@ -199,7 +200,7 @@ def correction_strata(
     run_directory: RunDirectory,
     limit: int | None,
     after: CorrectAfter = "wrong",
-    by: str = "expert",
+    by: str = EXPERT,
     max_steps: int | None = None,
     own_thoughts_in: Language | None = None,
 ) -> tuple[dict[tuple[str, str], Stratum], dict[str, int]]:

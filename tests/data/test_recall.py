@@ -139,7 +139,7 @@ def test_the_user_tells_how_often_places_were_opened() -> None:
     ]
 
 
-def test_in_chinese() -> None:
+def test_the_chinese_words() -> None:
     texts = load_dialect("text-recall").texts["zh"]
     here = turn(verbs.OPEN, "Drawer", view=[sees("Mug", "Shelf")], navigable=["Drawer"])
     first = Perceived.at(here)

@@ -283,10 +283,9 @@ def test_settings_that_do_not_fit_a_dialect(tmp_path: Path) -> None:
     assert texts.named is not None
     assert texts.notes is not None
     named = texts.named.model_copy(update={"seen": "seen"})
-    for word in ("at", "at_far"):
-        notes = texts.notes.model_copy(update={word: "at"})
-        for more in ({"named": named}, {"notes": notes}):
-            assert digest_of(texts.model_copy(update=more)) != digest_of(texts)
+    notes = [texts.notes.model_copy(update={word: "at"}) for word in ("at", "at_far")]
+    for more in ({"named": named}, *({"notes": each} for each in notes)):
+        assert digest_of(texts.model_copy(update=more)) != digest_of(texts)
     recall = load_dialect("text-recall").texts["en"]
     none = {"at_far": "", "opened": ""}  # as it was before it had these words
     before = recall.model_copy(
