@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict
 from agents.vlm.chat import Reply, Role, Usage
 from agents.vlm.redaction import Secrets
 from agents.vlm.settings import AgentSettings
-from er_gym.rollout.records import By, GrownRecord
+from er_gym.rollout.records import By, added
 
 
 class _Record(BaseModel):
@@ -66,7 +66,7 @@ class TrimmedRecord(_Record):
     why: str
 
 
-class RoundRecord(_Record, GrownRecord):
+class RoundRecord(_Record):
     """A reply and its result.
 
     Attributes:
@@ -89,8 +89,6 @@ class RoundRecord(_Record, GrownRecord):
             server; None for nothing.
     """
 
-    added = ("by", "trimmed")
-
     message: int
     thoughts: list[ThoughtRecord] = []
     action: str = ""
@@ -110,8 +108,8 @@ class RoundRecord(_Record, GrownRecord):
     finish: str = ""
     model: str = ""
     kept: bool = False
-    by: By = ""
-    trimmed: TrimmedRecord | None = None
+    by: By = added("")
+    trimmed: TrimmedRecord | None = added(None)
 
     @property
     def usage(self) -> Usage:

@@ -23,7 +23,7 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from er_gym.rollout.json_lines import JsonLines
-from er_gym.rollout.records import GrownRecord, Words
+from er_gym.rollout.records import Words, added
 
 EVENTS = "events.jsonl"
 """The file's name in a run directory."""
@@ -116,7 +116,7 @@ class StepDone(_Event):
     feedback: Words = ""
 
 
-class EpisodeEnded(GrownRecord, _Event):
+class EpisodeEnded(_Event):
     """An episode is over and its record is in the run directory.
 
     Attributes:
@@ -131,8 +131,6 @@ class EpisodeEnded(GrownRecord, _Event):
         side_effects: how many its record tells; None if it tells none.
     """
 
-    added = ("replies", "causes", "unusable", "ended", "side_effects")
-
     kind: Literal["episode_ended"] = "episode_ended"
     task_id: str
     task_type: str
@@ -142,11 +140,11 @@ class EpisodeEnded(GrownRecord, _Event):
     steps: int
     seconds: float
     error: Words = ""
-    replies: int = 0
-    causes: dict[str, int] = {}
-    unusable: dict[str, int] = {}
-    ended: str = ""
-    side_effects: int | None = None
+    replies: int = added(0)
+    causes: dict[str, int] = added({})
+    unusable: dict[str, int] = added({})
+    ended: str = added("")
+    side_effects: int | None = added(None)
 
 
 class Cost(_Event):

@@ -6,17 +6,12 @@ reader would misread takes a new ``format``.
 
 from __future__ import annotations
 
+import operator
 import re
-from typing import Annotated, Any, ClassVar, Final, Literal, TypeAlias
+from functools import partial
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    SerializerFunctionWrapHandler,
-    model_serializer,
-)
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from er_gym.tasks.judge import search_targets
 from er_gym.tasks.paper_records import odd_spellings
@@ -44,23 +39,19 @@ class _Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class GrownRecord(_Record):
-    """A kind of record to which later versions of er-gym have added fields.
+def added(default: Any, **constraints: Any) -> Any:
+    """A field that a later version of er-gym has added to a kind of record. Where it has its
+    default, the record is written without it, as before.
 
-    Attributes:
-        added: the names of these fields. Where one has its default, the record is written without
-            it, as before.
+    A serializer in Python would do the same, but Ctrl-C while it runs would come out of pydantic as
+    another error; here nothing that runs is Python code.
+
+    Args:
+        default: the default.
+        constraints: of the value, as :func:`pydantic.Field` takes them.
     """
-
-    added: ClassVar[tuple[str, ...]] = ()
-
-    @model_serializer(mode="wrap")
-    def _without_defaults(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        told: dict[str, Any] = handler(self)
-        for name in self.added:
-            if getattr(self, name) == type(self).model_fields[name].default:
-                told.pop(name, None)
-        return told
+    is_default = partial(operator.is_ if default is None else operator.eq, default)
+    return Field(default=default, exclude_if=is_default, **constraints)
 
 
 def episode_key(task_id: str, sample: int = 1) -> str:
@@ -101,7 +92,7 @@ class KeyActionRecord(_Record):
     spelled: str = ""
 
 
-class StepRecord(GrownRecord):
+class StepRecord(_Record):
     """One step, and the types that were legal targets after it.
 
     Attributes:
@@ -124,8 +115,6 @@ class StepRecord(GrownRecord):
             ``""`` for none: such a failure is not the agent's.
     """
 
-    added = ("by", "causes", "fault")
-
     verb: str
     object_type: Words = ""
     object_id: str = ""
@@ -137,12 +126,12 @@ class StepRecord(GrownRecord):
     thought: Words = ""
     text: Words = ""
     appended: bool = False
-    by: By = ""
-    causes: list[str] = []
-    fault: str = ""
+    by: By = added("")
+    causes: list[str] = added([])
+    fault: str = added("")
 
 
-class EpisodeRecord(GrownRecord):
+class EpisodeRecord(_Record):
     """One episode of one task.
 
     Attributes:
@@ -173,8 +162,6 @@ class EpisodeRecord(GrownRecord):
             written before records had this field, and in an episode that was broken off.
     """
 
-    added = ("sample", "cause", "gave_up", "side_effects")
-
     format: Literal["er-gym/episode/1"] = "er-gym/episode/1"
     task_id: str
     task_type: str
@@ -194,10 +181,10 @@ class EpisodeRecord(GrownRecord):
     seconds: float
     error: Words = ""
     run: str = ""
-    sample: int = Field(default=1, ge=1)
-    cause: str = ""
-    gave_up: Words = ""
-    side_effects: list[str] | None = None
+    sample: int = added(1, ge=1)
+    cause: str = added("")
+    gave_up: Words = added("")
+    side_effects: list[str] | None = added(None)
 
     @property
     def key(self) -> str:
