@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from agents.finetune.other_wordings import as_learnt
 from agents.finetune.settings import DataSettings
-from agents.finetune.word_noise import with_word_noise
 from er_gym.data.chat import Chat, ChatTurn
 from er_gym.data.collection import MANIFEST, Collection
 from er_gym.data.dialects import load_dialect
@@ -127,9 +127,9 @@ def drawn(items: Iterable[Item], limit: int | None) -> Iterable[Item]:
 def _opened(path: Path, settings: DataSettings) -> _Source:
     if (path / MANIFEST).is_file():
         return _of_collection(Collection.open(path), settings)
-    if is_frame_set(path):  # it has no instructions, so word noise changes nothing in it
+    if is_frame_set(path):  # it has no instructions, so other words change nothing in it
         return _of_frames(FrameSet.open(path), settings)
-    settings.refuse_word_noise(path)
+    settings.refuse_other_words(path)
     if not path.exists():
         raise ValueError(
             f"{path} does not exist; give what er-gym collect wrote, or a ShareGPT file"
@@ -147,7 +147,7 @@ def _opened(path: Path, settings: DataSettings) -> _Source:
 def _of_collection(collection: Collection, settings: DataSettings) -> _Source:
     dialect = load_dialect(settings.dialect)
     trajectories = [
-        with_word_noise(each, settings.word_noise)
+        as_learnt(each, settings)
         for each in collection.trajectories()
         if settings.takes(each.part, each.kind)
     ]
@@ -179,11 +179,11 @@ def _of_frames(frames: FrameSet, settings: DataSettings) -> _Source:
 
 
 def _check_choice(paths: Sequence[Path], settings: DataSettings) -> None:
-    """Refuse parts and kinds that none of the collections has, and word noise without a collection.
+    """Refuse parts and kinds that none of the collections has, and other words where there is none.
     A ShareGPT file has neither parts nor kinds."""
     collections = [Collection.open(path) for path in paths if (path / MANIFEST).is_file()]
     if not collections:
-        settings.refuse_word_noise(paths[0])
+        settings.refuse_other_words(paths[0])
     else:
         names = ", ".join(str(each.path) for each in collections)
         settings.check_choice(names, (one for each in collections for one in each.trajectories()))

@@ -78,6 +78,9 @@ class DataSettings(StrictSettings):
             an object type is replaced by random syllables. A model from random weights learns so to
             read instructions with words that are new to it. Only for collections; frames beside
             them stay as they are.
+        other_wordings: with this probability, an English instruction is first told in a wording
+            that no suite uses (:mod:`er_gym.tasks.wordings.english_further`). Only for collections,
+            too, and for tasks that er-gym generated.
         max_length: the most tokens of a conversation. A longer one is an error: to cut it would cut
             pictures.
         min_pixels, max_pixels: a picture with fewer or more is scaled.
@@ -90,6 +93,7 @@ class DataSettings(StrictSettings):
     language: Language | None = None
     mask: Mask = "turns"
     word_noise: Fraction = 0.0
+    other_wordings: Fraction = 0.0
     max_length: Positive = 32_768
     min_pixels: Positive = 3_136
     max_pixels: Positive = 180_000
@@ -112,17 +116,18 @@ class DataSettings(StrictSettings):
         """Whether a trajectory of this part and kind is used."""
         return (not self.parts or part in self.parts) and (not self.kinds or kind in self.kinds)
 
-    def refuse_word_noise(self, path: Path) -> None:
-        """Refuse word noise where instructions cannot be told from other words.
+    def refuse_other_words(self, path: Path) -> None:
+        """Refuse to change instructions where they cannot be told from other words.
 
         Raises:
             ValueError: it is asked for, and the path is no collection.
         """
-        if self.word_noise:
-            raise ValueError(
-                f"{path} is no collection of er-gym collect, and data.word_noise={self.word_noise} "
-                "is for those; set data.word_noise=0"
-            )
+        for name in ("word_noise", "other_wordings"):
+            if share := getattr(self, name):
+                raise ValueError(
+                    f"{path} is no collection of er-gym collect, and data.{name}={share} is for "
+                    f"those; set data.{name}=0"
+                )
 
     def check_choice(self, where: str, trajectories: Iterable[Trajectory]) -> None:
         """Refuse a part or a kind that no trajectory has.

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import er_gym
+from agents.finetune.other_wordings import as_learnt
 from agents.finetune.samples import drawn
 from agents.finetune.settings import DataSettings, Mask
-from agents.finetune.word_noise import with_word_noise
 from er_gym.data.chat import Chat
 from er_gym.data.collection import MANIFEST, Collection, CollectionManifest
 from er_gym.data.dialects import Dialect, load_dialect
@@ -83,7 +83,7 @@ def open_source(path: Path, settings: DataSettings) -> Source:
         collection = Collection.open(path)
         settings.check_choice(str(collection.path), collection.trajectories())
         return Source(path, collection, dialect, lambda: _of_collection(collection, settings))
-    settings.refuse_word_noise(path)
+    settings.refuse_other_words(path)
     if path.is_dir() and not (path / "dataset_info.json").is_file():
         raise ValueError(
             f"{path} holds neither a collection ({MANIFEST}) nor dataset_info.json; give what "
@@ -188,7 +188,7 @@ def released(chat: Chat) -> Chat:
 def _of_collection(collection: Collection, settings: DataSettings) -> Iterator[Chat]:
     dialect = load_dialect(settings.dialect)
     taken = (
-        with_word_noise(each, settings.word_noise)
+        as_learnt(each, settings)
         for each in collection.trajectories()
         if each.turns and settings.takes(each.part, each.kind)
     )

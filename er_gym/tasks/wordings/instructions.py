@@ -14,6 +14,7 @@ from er_gym.tasks.room_kinds import HOUSE, ROOM_KINDS, room_kind
 from er_gym.tasks.task import Task
 from er_gym.tasks.wordings import chinese
 from er_gym.tasks.wordings.english import ENGLISH
+from er_gym.tasks.wordings.english_further import FURTHER
 from er_gym.tasks.wordings.grammar import Grammar, Parts, Style, Wording, capital
 from er_gym.tasks.wordings.names import as_types, chinese_names, names_unseen, renamed
 from er_gym.tasks.wordings.told import IN_ORDER, Place, Thing, Told, told_by
@@ -68,9 +69,28 @@ def instruction(
     if told is None:
         return None
     told = replace(told, room=told.room or room_kind(scene))
-    if (said := _drawn(told, wording, language, rng)) is None:
+    if (said := _drawn(told, wording, language, rng, _GRAMMARS[language])) is None:
         return None
     return said if language == "zh" else renamed(capital(said), wording, rng)
+
+
+def further_instruction(name: str, draw: str, scene: str) -> str | None:
+    """An English instruction for a task in a wording of :data:`FURTHER`, which no suite uses.
+
+    Args:
+        name: the task's name, which says what is to be done.
+        draw: draws one of the wordings; the same text always draws the same one.
+        scene: its kind of room may be named.
+
+    Returns:
+        None if the name is none that er-gym generates.
+    """
+    if (told := told_by(name)) is None:
+        return None
+    rng = random.Random(f"{draw}/further")
+    told = replace(told, room=told.room or room_kind(scene))
+    said = _drawn(told, "seen", "en", rng, FURTHER)
+    return None if said is None else renamed(said, "seen", rng)
 
 
 def reworded(task: Task, wording: Wording, language: Language = "en") -> Task:
@@ -123,8 +143,9 @@ def in_language(tasks: Iterable[Task], language: Language) -> tuple[Task, ...]:
 # -- telling --------------------------------------------------------------------------------------
 
 
-def _drawn(told: Told, wording: Wording, language: Language, rng: random.Random) -> str | None:
-    grammar = _GRAMMARS[language]
+def _drawn(
+    told: Told, wording: Wording, language: Language, rng: random.Random, grammar: Grammar
+) -> str | None:
     if told.kind == IN_ORDER:
         clauses = [_ways(clause, language) for clause in told.clauses]
         if not all(ways.seen for ways in clauses):
