@@ -21,11 +21,11 @@ def as_learnt(trajectory: Trajectory, settings: DataSettings) -> Trajectory:
 
 
 def with_other_wording(trajectory: Trajectory, share: float) -> Trajectory:
-    """A trajectory whose English instruction is perhaps told in words that no suite uses.
+    """A trajectory whose English instruction is perhaps told in a further wording.
 
     A tiny model reads "get the Mug from the room" as it reads the nearest wording that it knows,
-    and only looks for the Mug. These wordings are for learning alone: measurements in a suite's
-    seen and unseen wordings stay what they are.
+    and only looks for the Mug. None of the further wordings is kept for evaluation, so
+    measurements in a suite's seen and unseen wordings stay what they are.
 
     Args:
         trajectory: what was recorded. It stays as it is if its instruction is not in English, or

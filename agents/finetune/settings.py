@@ -79,8 +79,8 @@ class DataSettings(StrictSettings):
             read instructions with words that are new to it. Only for collections; frames beside
             them stay as they are.
         other_wordings: with this probability, an English instruction is first told in a wording
-            that no suite uses (:mod:`er_gym.tasks.wordings.english_further`). Only for collections,
-            too, and for tasks that er-gym generated.
+            of :mod:`er_gym.tasks.wordings.english_further`, none of which is kept for evaluation.
+            Only for collections, too, and for tasks that er-gym generated.
         max_length: the most tokens of a conversation. A longer one is an error: to cut it would cut
             pictures.
         min_pixels, max_pixels: a picture with fewer or more is scaled.

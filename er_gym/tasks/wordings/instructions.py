@@ -75,7 +75,7 @@ def instruction(
 
 
 def further_instruction(name: str, draw: str, scene: str) -> str | None:
-    """An English instruction for a task in a wording of :data:`FURTHER`, which no suite uses.
+    """An English instruction for a task in a wording of :data:`FURTHER`, from which no suite draws.
 
     Args:
         name: the task's name, which says what is to be done.
