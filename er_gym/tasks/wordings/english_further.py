@@ -2,8 +2,8 @@
 
 No suite draws from them, so they change no task and no measurement. Who wrote them had seen neither
 the wordings of er-gym nor the paper's tasks. None has a word that only evaluation's wordings have.
-For each of them, a reader told from a sentence alone which kind of task it is, and was right each
-time.
+For each core and whole sentence, a reader told from one instruction alone which kind of task it
+is, and was right each time.
 
 The fields are those of :mod:`er_gym.tasks.wordings.english_sentences`.
 """
