@@ -99,3 +99,20 @@ def test_another_draw_is_told_otherwise() -> None:
     assert len({*drawn}) > 200
     told = " ".join(filter(None, drawn))
     assert {"retrieve", "fetch", "grab"} <= {*re.findall("[a-z]+", told)}
+
+
+@pytest.mark.parametrize(
+    "name", ["Find the Mug in the kitchen.", "Pick up the Mug in the kitchen."]
+)
+def test_half_of_the_rooms_are_just_the_room(name: str) -> None:
+    drawn = [further_instruction(name, f"t{number}", "FloorPlan1") for number in range(400)]
+    named = [said for said in drawn if said and "the kitchen" in said]
+    plain = [said for said in drawn if said and "the room" in said]
+    assert 0.4 < len(plain) / len([*plain, *named]) < 0.6
+    assert len({*plain}) > 60
+    at_home = [
+        further_instruction(name.replace("kitchen", "house"), f"t{n}", "House1-1")
+        for n in range(99)
+    ]
+    assert "the house" in "".join(filter(None, at_home))
+    assert not any(said and "the room" in said for said in at_home)
