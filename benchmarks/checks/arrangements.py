@@ -1,0 +1,101 @@
+"""How much wider an interval is that takes the tasks of one arrangement of a room to be alike.
+
+    python -m benchmarks.checks.arrangements RUN... [--before RUN]
+
+The tasks of a generated suite share arrangements: where one hides a thing well, several tasks fail
+together. The usual intervals count tasks as independent. That is right for the tasks of that suite,
+and too narrow for what another suite of the same kind would give. With ``--before`` the table shows
+how much more each run does than that one, in the tasks of both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from benchmarks.scoring.metrics import Estimate, success_rate
+from benchmarks.scoring.report import RunReport, load_run
+from benchmarks.scoring.samples import variance_between
+from benchmarks.scoring.scorers import CORRECTED
+from er_gym.rollout.run_directory import RunDirectoryError
+from er_gym.tables import Table, as_markdown
+
+_COLUMNS = ("Run", "Tasks", "Arrangements", "Success", "Tasks independent", "Arrangements")
+
+
+def arrangement_of(scene: str, task_id: str) -> str:
+    """The room of a task, and which of its arrangements.
+
+    The id of a generated task begins with the scene and, if the scene is rearranged, a number.
+    Others are of the scene as it was recorded.
+    """
+    number = task_id.removeprefix(f"{scene}-").partition("-")[0]
+    return f"{scene}-{number}" if number.isdigit() and task_id.startswith(scene) else scene
+
+
+def difference(groups: Sequence[str], values: Sequence[float]) -> Estimate:
+    """The mean of paired differences, with 1.96 standard errors between groups to each side.
+
+    Args:
+        groups: (n,) what each difference belongs to, and shares with others.
+        values: (n,) the differences.
+    """
+    mean = math.fsum(values) / len(values)
+    variance = variance_between(groups, values)
+    if variance is None:
+        return Estimate(mean, None, None)
+    half = 1.96 * math.sqrt(variance)
+    return Estimate(mean, mean - half, mean + half)
+
+
+def _successes(run: RunReport) -> dict[str, tuple[str, bool]]:
+    """By task: its arrangement, and whether it was done (the last time, if several)."""
+    return {
+        score.task_id: (arrangement_of(episode.scene, score.task_id), score.success)
+        for episode, score in zip(run.episodes, run.scores[CORRECTED.name], strict=True)
+    }
+
+
+def _row(run: RunReport, before: RunReport | None) -> tuple[str, ...]:
+    done = _successes(run)
+    if before is None:
+        arrangements = [where for where, _ in done.values()]
+        values = [success for _, success in done.values()]
+        estimates = [success_rate(groups, values) for groups in (list(done), arrangements)]
+    else:
+        earlier = _successes(before)
+        common = [task for task in done if task in earlier]
+        if not common:
+            raise click.ClickException(f"{run.path} and {before.path} have no task in common")
+        arrangements = [done[task][0] for task in common]
+        changes = [float(done[task][1]) - float(earlier[task][1]) for task in common]
+        estimates = [difference(groups, changes) for groups in (common, arrangements)]
+    tasks, different = str(len(arrangements)), str(len(set(arrangements)))
+    shown = f"{100 * estimates[0].mean:.1f}"
+    return run.path.name, tasks, different, shown, *map(_interval, estimates)
+
+
+def _interval(estimate: Estimate) -> str:
+    if estimate.low is None or estimate.high is None:
+        return ""
+    return f"{100 * estimate.low:.1f} to {100 * estimate.high:.1f}"
+
+
+@click.command(help=__doc__)
+@click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--before", type=click.Path(path_type=Path), help="A run directory of er-gym bench.")
+def main(runs: tuple[Path, ...], before: Path | None) -> None:
+    try:
+        first = load_run(before) if before else None
+        rows = tuple(_row(load_run(run), first) for run in runs)
+    except RunDirectoryError as error:
+        raise click.ClickException(str(error)) from error
+    title = f"Success, gain over {before.name}, in %" if before else "Success in %"
+    click.echo(as_markdown([Table(title, _COLUMNS, rows, 1)]))
+
+
+if __name__ == "__main__":
+    main()

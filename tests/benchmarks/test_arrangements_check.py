@@ -1,0 +1,53 @@
+"""Intervals that take the tasks of one arrangement to be alike."""
+
+from __future__ import annotations
+
+from math import sqrt
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from benchmarks.checks.arrangements import arrangement_of, difference, main
+from benchmarks.cli.main import cli as er_gym
+
+
+@pytest.mark.parametrize(
+    ("scene", "task_id", "arrangement"),
+    [
+        ("FloorPlan3", "FloorPlan3-246031-single_search-Bowl", "FloorPlan3-246031"),
+        ("FloorPlan3", "FloorPlan3-single_search-Bowl", "FloorPlan3"),
+        ("FloorPlan3", "paper-797", "FloorPlan3"),
+        ("House1-7000", "House1-7000-795600-single_pickup-Pen", "House1-7000-795600"),
+        ("FloorPlan3", "FloorPlan301-1-single_search-Bowl", "FloorPlan3"),
+    ],
+)
+def test_arrangements_by_the_ids_of_tasks(scene: str, task_id: str, arrangement: str) -> None:
+    assert arrangement_of(scene, task_id) == arrangement
+
+
+def test_the_interval_of_differences_that_come_in_groups() -> None:
+    values = [1.0, 1.0, 0.0, 0.0, -1.0, 0.0]
+    one = difference(["a", "a", "b", "b", "c", "c"], values)
+    # The mean is 1/6; the groups' sums differ from twice that by 5/3, -1/3 and -4/3.
+    error = sqrt(3 / 2 * (25 + 1 + 16) / 9 / 6**2)
+    assert one.mean == pytest.approx(1 / 6)
+    assert one.low == pytest.approx(1 / 6 - 1.96 * error)
+    assert one.high == pytest.approx(1 / 6 + 1.96 * error)
+    assert difference(["a", "a"], [1.0, 0.0]).low is None
+
+
+def test_the_table_of_runs(tmp_path: Path) -> None:
+    runs = [str(tmp_path / name) for name in ("random", "oracle")]
+    for agent, run in zip(("random", "oracle"), runs, strict=True):
+        command = ["bench", "--suite", "mini", "--limit", "6", "--agent", agent, "--out", run]
+        assert CliRunner().invoke(er_gym, command).exit_code == 0
+    alone = CliRunner().invoke(main, runs)
+    assert alone.exit_code == 0, alone.output
+    assert "| oracle | 6 |" in alone.output
+    assert "| 100.0 |" in alone.output
+    paired = CliRunner().invoke(main, [runs[1], "--before", runs[1]])
+    assert "| 0.0 | 0.0 to 0.0 |" in paired.output
+    missing = CliRunner().invoke(main, [str(tmp_path / "none")])
+    assert missing.exit_code == 1
+    assert "is no run" in missing.output
