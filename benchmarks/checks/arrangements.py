@@ -5,7 +5,7 @@
 The tasks of a generated suite share arrangements: where one hides a thing well, several tasks fail
 together. The usual intervals count tasks as independent. That is right for the tasks of that suite,
 and too narrow for what another suite of the same kind would give. With ``--before`` the table shows
-how much more each run does than that one, in the tasks of both.
+how much more each run does than that one, in the tasks of both; other tasks do not count.
 """
 
 from __future__ import annotations
@@ -13,17 +13,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import fmean
+from typing import NamedTuple
 
 import click
 
 from benchmarks.scoring.metrics import Estimate, success_rate
 from benchmarks.scoring.report import RunReport, load_run
-from benchmarks.scoring.samples import variance_between
+from benchmarks.scoring.samples import group_by, variance_between
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.rollout.run_directory import RunDirectoryError
 from er_gym.tables import Table, as_markdown
 
-_COLUMNS = ("Run", "Tasks", "Arrangements", "Success", "Tasks independent", "Arrangements")
+_COLUMNS = ("Run", "Tasks", "Arrangements")
+_INTERVALS = ("By tasks", "By arrangements")
 
 
 def arrangement_of(scene: str, task_id: str) -> str:
@@ -33,7 +36,7 @@ def arrangement_of(scene: str, task_id: str) -> str:
     Others are of the scene as it was recorded.
     """
     number = task_id.removeprefix(f"{scene}-").partition("-")[0]
-    return f"{scene}-{number}" if number.isdigit() and task_id.startswith(scene) else scene
+    return f"{scene}-{number}" if number.isdigit() and task_id.startswith(f"{scene}-") else scene
 
 
 def difference(groups: Sequence[str], values: Sequence[float]) -> Estimate:
@@ -51,29 +54,44 @@ def difference(groups: Sequence[str], values: Sequence[float]) -> Estimate:
     return Estimate(mean, mean - half, mean + half)
 
 
-def _successes(run: RunReport) -> dict[str, tuple[str, bool]]:
-    """By task: its arrangement, and whether it was done (the last time, if several)."""
-    return {
-        score.task_id: (arrangement_of(episode.scene, score.task_id), score.success)
+class _Played(NamedTuple):
+    """An episode: its task, its arrangement, and whether the task was done."""
+
+    task: str
+    arrangement: str
+    success: bool
+
+
+def _played(run: RunReport) -> list[_Played]:
+    return [
+        _Played(score.task_id, arrangement_of(episode.scene, score.task_id), score.success)
         for episode, score in zip(run.episodes, run.scores[CORRECTED.name], strict=True)
-    }
+    ]
+
+
+def _rates(played: Sequence[_Played]) -> dict[str, float]:
+    """By task: the share of its episodes that are successes."""
+    parts = group_by(played, lambda each: each.task)
+    return {task: fmean(each.success for each in part) for task, part in parts.items()}
 
 
 def _row(run: RunReport, before: RunReport | None) -> tuple[str, ...]:
-    done = _successes(run)
+    played = _played(run)
+    if not played:
+        raise click.ClickException(f"{run.path} has no episode")
+    where = {each.task: each.arrangement for each in played}
     if before is None:
-        arrangements = [where for where, _ in done.values()]
-        values = [success for _, success in done.values()]
-        estimates = [success_rate(groups, values) for groups in (list(done), arrangements)]
+        successes = [each.success for each in played]
+        groups = [each.task for each in played], [each.arrangement for each in played]
+        estimates = [success_rate(each, successes) for each in groups]
     else:
-        earlier = _successes(before)
-        common = [task for task in done if task in earlier]
-        if not common:
+        now, then = _rates(played), _rates(_played(before))
+        where = {task: arrangement for task, arrangement in where.items() if task in then}
+        if not where:
             raise click.ClickException(f"{run.path} and {before.path} have no task in common")
-        arrangements = [done[task][0] for task in common]
-        changes = [float(done[task][1]) - float(earlier[task][1]) for task in common]
-        estimates = [difference(groups, changes) for groups in (common, arrangements)]
-    tasks, different = str(len(arrangements)), str(len(set(arrangements)))
+        changes = [now[task] - then[task] for task in where]
+        estimates = [difference(each, changes) for each in (list(where), list(where.values()))]
+    tasks, different = str(len(where)), str(len(set(where.values())))
     shown = f"{100 * estimates[0].mean:.1f}"
     return run.path.name, tasks, different, shown, *map(_interval, estimates)
 
@@ -94,7 +112,8 @@ def main(runs: tuple[Path, ...], before: Path | None) -> None:
     except RunDirectoryError as error:
         raise click.ClickException(str(error)) from error
     title = f"Success, gain over {before.name}, in %" if before else "Success in %"
-    click.echo(as_markdown([Table(title, _COLUMNS, rows, 1)]))
+    columns = (*_COLUMNS, "Gain" if before else "Success", *_INTERVALS)
+    click.echo(as_markdown([Table(title, columns, rows, 1)]))
 
 
 if __name__ == "__main__":

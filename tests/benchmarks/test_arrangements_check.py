@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 from benchmarks.checks.arrangements import arrangement_of, difference, main
 from benchmarks.cli.main import cli as er_gym
+from benchmarks.scoring.metrics import wilson
 
 
 @pytest.mark.parametrize(
@@ -40,14 +41,21 @@ def test_the_interval_of_differences_that_come_in_groups() -> None:
 def test_the_table_of_runs(tmp_path: Path) -> None:
     runs = [str(tmp_path / name) for name in ("random", "oracle")]
     for agent, run in zip(("random", "oracle"), runs, strict=True):
-        command = ["bench", "--suite", "mini", "--limit", "6", "--agent", agent, "--out", run]
+        command = ["bench", "--suite", "er-1k", "--limit", "40", "--agent", agent, "--out", run]
         assert CliRunner().invoke(er_gym, command).exit_code == 0
     alone = CliRunner().invoke(main, runs)
     assert alone.exit_code == 0, alone.output
-    assert "| oracle | 6 |" in alone.output
-    assert "| 100.0 |" in alone.output
+    [row] = [line for line in alone.output.splitlines() if line.startswith("| oracle")]
+    _, _, tasks, arrangements, rate, by_tasks, by_arrangements, _ = row.split("|")
+    assert (tasks.strip(), rate.strip()) == ("40", "100.0")
+    # Where all succeed, a task or an arrangement counts once.
+    for count, shown in ((tasks, by_tasks), (arrangements, by_arrangements)):
+        low = wilson(int(count), int(count)).low
+        assert low is not None
+        assert shown.strip() == f"{100 * low:.1f} to 100.0"
+    assert int(arrangements) < int(tasks)
     paired = CliRunner().invoke(main, [runs[1], "--before", runs[1]])
-    assert "| 0.0 | 0.0 to 0.0 |" in paired.output
+    assert "| 0.0 | 0.0 to 0.0 | 0.0 to 0.0 |" in paired.output
     missing = CliRunner().invoke(main, [str(tmp_path / "none")])
     assert missing.exit_code == 1
     assert "is no run" in missing.output
