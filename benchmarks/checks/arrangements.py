@@ -10,7 +10,6 @@ how much more each run does than that one, in the tasks of both; other tasks do 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from statistics import fmean
@@ -18,9 +17,9 @@ from typing import NamedTuple
 
 import click
 
-from benchmarks.scoring.metrics import Estimate, success_rate
+from benchmarks.scoring.metrics import Estimate, between, success_rate
 from benchmarks.scoring.report import RunReport, load_run
-from benchmarks.scoring.samples import group_by, variance_between
+from benchmarks.scoring.samples import group_by
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.rollout.run_directory import RunDirectoryError
 from er_gym.tables import Table, as_markdown
@@ -37,21 +36,6 @@ def arrangement_of(scene: str, task_id: str) -> str:
     """
     number = task_id.removeprefix(f"{scene}-").partition("-")[0]
     return f"{scene}-{number}" if number.isdigit() and task_id.startswith(f"{scene}-") else scene
-
-
-def difference(groups: Sequence[str], values: Sequence[float]) -> Estimate:
-    """The mean of paired differences, with 1.96 standard errors between groups to each side.
-
-    Args:
-        groups: (n,) what each difference belongs to, and shares with others.
-        values: (n,) the differences.
-    """
-    mean = math.fsum(values) / len(values)
-    variance = variance_between(groups, values)
-    if variance is None:
-        return Estimate(mean, None, None)
-    half = 1.96 * math.sqrt(variance)
-    return Estimate(mean, mean - half, mean + half)
 
 
 class _Played(NamedTuple):
@@ -90,7 +74,7 @@ def _row(run: RunReport, before: RunReport | None) -> tuple[str, ...]:
         if not where:
             raise click.ClickException(f"{run.path} and {before.path} have no task in common")
         changes = [now[task] - then[task] for task in where]
-        estimates = [difference(each, changes) for each in (list(where), list(where.values()))]
+        estimates = [between(each, changes) for each in (list(where), list(where.values()))]
     tasks, different = str(len(where)), str(len(set(where.values())))
     shown = f"{100 * estimates[0].mean:.1f}"
     return run.path.name, tasks, different, shown, *map(_interval, estimates)

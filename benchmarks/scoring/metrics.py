@@ -266,10 +266,15 @@ def normal(values: Sequence[float]) -> Estimate:
     return Estimate(mean, mean - half, mean + half)
 
 
-def _between(tasks: Sequence[str], values: Sequence[float]) -> Estimate:
-    """A mean over episodes with the normal interval of the standard error between tasks."""
+def between(groups: Sequence[str], values: Sequence[float]) -> Estimate:
+    """A mean with the normal interval of the standard error between groups; missing for one group.
+
+    Args:
+        groups: (n,) what each value belongs to and shares with others, such as its task.
+        values: (n,) at least one.
+    """
     mean = math.fsum(values) / len(values)
-    variance = variance_between(tasks, values)
+    variance = variance_between(groups, values)
     if variance is None:
         return Estimate(mean, None, None)
     half = _Z * math.sqrt(variance)
@@ -307,7 +312,7 @@ def summarise(scores: Sequence[Score]) -> Summary:
         means[TIDY] = success_rate(tasks, told[TIDY])
     if None not in told[SIDE_EFFECTS]:
         effects = told[SIDE_EFFECTS]
-        mean = _between(tasks, effects) if several else normal(effects)
+        mean = between(tasks, effects) if several else normal(effects)
         means[SIDE_EFFECTS] = _within(mean, max(effects))
     return Summary(len(scores), means)
 
@@ -327,7 +332,7 @@ def estimate_of(
     """
     if metric == "success":
         return success_rate(tasks, [bool(value) for value in values])
-    mean = _between(tasks, values) if several else normal(values)
+    mean = between(tasks, values) if several else normal(values)
     return _within(mean, max(1.0, *values))
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from math import sqrt
 from pathlib import Path
+from statistics import NormalDist
 
 import pytest
 from click.testing import CliRunner
 
-from benchmarks.checks.arrangements import arrangement_of, difference, main
+from benchmarks.checks.arrangements import arrangement_of, main
 from benchmarks.cli.main import cli as er_gym
-from benchmarks.scoring.metrics import wilson
+from benchmarks.scoring.metrics import between, wilson
 
 
 @pytest.mark.parametrize(
@@ -29,13 +30,13 @@ def test_arrangements_by_the_ids_of_tasks(scene: str, task_id: str, arrangement:
 
 def test_the_interval_of_differences_that_come_in_groups() -> None:
     values = [1.0, 1.0, 0.0, 0.0, -1.0, 0.0]
-    one = difference(["a", "a", "b", "b", "c", "c"], values)
+    one = between(["a", "a", "b", "b", "c", "c"], values)
     # The mean is 1/6; the groups' sums differ from twice that by 5/3, -1/3 and -4/3.
     error = sqrt(3 / 2 * (25 + 1 + 16) / 9 / 6**2)
     assert one.mean == pytest.approx(1 / 6)
-    assert one.low == pytest.approx(1 / 6 - 1.96 * error)
-    assert one.high == pytest.approx(1 / 6 + 1.96 * error)
-    assert difference(["a", "a"], [1.0, 0.0]).low is None
+    assert one.low == pytest.approx(1 / 6 - NormalDist().inv_cdf(0.975) * error)
+    assert one.high == pytest.approx(1 / 6 + NormalDist().inv_cdf(0.975) * error)
+    assert between(["a", "a"], [1.0, 0.0]).low is None
 
 
 def test_the_table_of_runs(tmp_path: Path) -> None:
