@@ -92,7 +92,8 @@ class RLAgent:
 
     def act(self, obs: Mapping[str, Any], info: Mapping[str, Any]) -> Decision:
         """The policy's best action."""
-        return Decision(ACTIONS[self._policy.best(self._see(obs, info), info["action_mask"])])
+        seen = self._see(obs, info)
+        return Decision(ACTIONS[self._policy.best(seen, self._policy_observation.allowed(info))])
 
     def overruled(self, action: Action, obs: Mapping[str, Any], info: Mapping[str, Any]) -> None:
         """Another decides this step; the observation before it is remembered as usual."""

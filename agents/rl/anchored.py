@@ -26,7 +26,13 @@ from agents.rl.config import TrainConfig
 from agents.rl.guidance import Start
 from agents.rl.network import TypeNetwork
 from agents.rl.policy import TypeFeatures, outputs
-from agents.rl.policy_file import CONFIG, load_network, policy_file, untrained_network
+from agents.rl.policy_file import (
+    CONFIG,
+    load_network,
+    observed_space,
+    policy_file,
+    untrained_network,
+)
 from agents.zoo.index import PREFIX, find_model
 
 _NEVER = -1e8
@@ -153,7 +159,8 @@ def divergence(start: Tensor, now: Tensor, legal: Tensor) -> Tensor:
 def starting_network(config: TrainConfig, start: Start) -> TypeNetwork:
     """The network of the policy that a run starts from.
 
-    Where the run observes sightings and the policy did not, it does not look at them at first.
+    Where the run observes sightings or a map and the policy did not, it does not look at them at
+    first.
 
     Raises:
         ValueError: there is no such policy, it cannot be read, or it is another network than the
@@ -167,15 +174,14 @@ def starting_network(config: TrainConfig, start: Start) -> TypeNetwork:
     except ValueError as error:
         raise ValueError(f"start.policy {name}: {error}") from error
     mine = untrained_network(config)
-    if config.env.sightings:
-        network.add_sightings()
+    network.observe_more(observed_space(config))
     theirs, wanted = network.state_dict(), mine.state_dict()
     if {key: each.shape for key, each in theirs.items()} != {
         key: each.shape for key, each in wanted.items()
     }:
         raise ValueError(
             f"start.policy {name} observes something else than this run, or its network has "
-            "another shape: take env (obs_mode, subtasks, sightings, instruction) and network "
-            f"from {file.parent / CONFIG}"
+            "another shape: take env (obs_mode, subtasks, sightings, object_map, instruction) and "
+            f"network from {file.parent / CONFIG}"
         )
     return network

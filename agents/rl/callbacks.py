@@ -257,7 +257,8 @@ class Curriculum(BetweenRollouts):
 class SuccessByType(BaseCallback):
     """Logs the success rate of each task type over its last ``over`` episodes.
 
-    Episodes that started near their goal are left out: they are easier.
+    Episodes that started elsewhere than at their beginning are left out: they are easier or
+    harder.
     """
 
     def __init__(self, over: int = 100) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
@@ -13,7 +14,9 @@ from numpy.typing import NDArray
 from agents.rl.adviser import Adviser
 from agents.rl.config import EnvConfig
 from agents.rl.demonstrations import Demonstrations, demonstrate
+from agents.rl.guidance import LongSearches
 from agents.rl.near_goal import (
+    LONG_SEARCH,
     MOMENT,
     Moment,
     StartsWithin,
@@ -76,7 +79,8 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
     """Draws tasks of the given types, and returns what :class:`PolicyObservation` makes of them.
 
     ``info["started_at"]`` is the position at which the episode started near its goal, 0 for an
-    episode from the beginning.
+    episode from the beginning, and :data:`~agents.rl.near_goal.LONG_SEARCH` for one that goes on
+    from a long search.
 
     Args:
         env: an ``EmbodiedEnv``, shaped or not.
@@ -85,6 +89,8 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         policy_observation: makes the learner's observations.
         options: whose demonstrations are used.
         near: the share of episodes that start near the goal, of types with a position.
+        long: when an episode goes on from where an earlier one had searched for long; None for
+            never.
     """
 
     looks_after_step = True
@@ -97,8 +103,11 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         policy_observation: PolicyObservation,
         options: EnvConfig,
         near: float = 0.0,
+        long: LongSearches | None = None,
     ) -> None:
         super().__init__(env)
+        self._long = long
+        self._searches = deque[Moment](maxlen=0 if long is None else long.kept)
         self._near, self._positions = near, dict[str, int]()
         self._started_at = 0
         self._demonstrations = demonstrations_of(options)
@@ -130,17 +139,23 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         obs, info = self.env.reset(seed=seed, options=chosen)
         moment: Moment | None = chosen.get(MOMENT)
         position = 0 if moment is None else moment.left
-        self._started_at = position and self._positions.get(info["task_type"], position)
+        if position > 0:
+            position = self._positions.get(info["task_type"], position)
+        self._started_at = position
         info |= {"seen": obs, "started_at": self._started_at}
         observation = self.policy_observation
         told = observation.info_of(self, info)
         if moment is None:
-            return observation.reset(obs, told, info["instruction"]), info
-        observation.recall(moment.memory)
-        return observation.observe(obs, told), info
+            seen = observation.reset(obs, told, info["instruction"])
+        else:
+            observation.recall(moment.memory)
+            seen = observation.observe(obs, told)
+        return seen, self._with_choice(info)
 
     def _next(self) -> dict[str, Any]:
-        """The options of the next episode: its task, or where it starts near its goal."""
+        """The options of the next episode: its task, or where it starts."""
+        if self._long is not None and self._searches and self._rng.random() < self._long.share:
+            return {MOMENT: self._searches[int(self._rng.integers(len(self._searches)))]}
         kind = self._types[int(self._rng.integers(len(self._types)))]
         task = self._source.draw(self._rng, kind, None)
         position = self._positions.get(task.type.name)
@@ -155,15 +170,31 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
 
     def step(self, action: Any) -> tuple[Obs, Any, bool, bool, dict[str, Any]]:
         """Do an action."""
+        observation = self.policy_observation
+        memory = observation.memory() if self._searched(1) and not self._started_at else None
         obs, reward, terminated, truncated, info = self.env.step(action)
         info |= {"seen": obs, "started_at": self._started_at}
-        seen = self.policy_observation.observe(obs, self.policy_observation.info_of(self, info))
-        return seen, reward, terminated, truncated, info
+        seen = observation.observe(obs, observation.info_of(self, info))
+        if memory is not None and self._searched() and not (terminated or truncated):
+            own: Any = self.unwrapped
+            self._searches.append(Moment(LONG_SEARCH, own.snapshot(), memory))
+        return seen, reward, terminated, truncated, self._with_choice(info)
+
+    def _searched(self, more: int = 0) -> bool:
+        """Whether so many more steps make a long search."""
+        if self._long is None:
+            return False
+        assert self.policy_observation.subtasks is not None  # the configuration sees to it
+        return self.policy_observation.subtasks.since == self._long.after - more
+
+    def _with_choice(self, info: dict[str, Any]) -> dict[str, Any]:
+        """``info`` whose mask has the actions between which the learner chooses."""
+        self._mask = info["action_mask"] = self.policy_observation.allowed(info)
+        return info
 
     def action_masks(self) -> NDArray[np.int8]:
-        """(A,) int8, the actions that are legal now."""
-        masks: NDArray[np.int8] = self.env.get_wrapper_attr("action_masks")()
-        return masks
+        """(A,) int8, the legal actions between which the learner chooses now."""
+        return self._mask
 
     def demonstrate(self, *asked: Any) -> Demonstrations:
         """See :func:`agents.rl.demonstrations.demonstrate`; for ``make_env(with_text=True)``."""
@@ -216,6 +247,7 @@ def make_env(
     with_text: bool = False,
     advised: bool = False,
     near: float = 0.0,
+    long: LongSearches | None = None,
     share: tuple[int, int] = (0, 1),
 ) -> gymnasium.Env[Obs, Any]:
     """Make a training environment.
@@ -227,7 +259,7 @@ def make_env(
         with_text: whether ``info["seen"]``, the environment's own observation, holds text, which
             scripted agents need.
         advised: whether the observation holds the searcher's advice; for options with subtasks.
-        near: the share of episodes that start near their goal (:class:`LearningEnv`).
+        near, long: which episodes start elsewhere than at their beginning (:class:`LearningEnv`).
         share: ``(index, count)`` of the worker process; each plays in its own rooms.
 
     Raises:
@@ -255,7 +287,7 @@ def make_env(
     if isinstance(source, TaskList):
         source = source.share(*share)
     observation = PolicyObservation(options, with_mask)
-    learning = LearningEnv(env, source, options.types, observation, options, near)
+    learning = LearningEnv(env, source, options.types, observation, options, near, long)
     return AdvisedEnv(learning) if advised else learning
 
 

@@ -91,6 +91,23 @@ class Phase(StrictSettings):
     _types = field_validator("types")(canonical_names)
 
 
+class LongSearches(StrictSettings):
+    """Episodes that start where an episode of the policy itself has been at one subtask for long.
+
+    Such states are few, and in them is most of what a good policy has still to learn. They are
+    kept whatever came of them, so in each the policy meets what it would meet in play.
+
+    Attributes:
+        share: of all episodes that start so, once there are such states.
+        after: the steps since the subtask began.
+        kept: so many states for each environment, the latest.
+    """
+
+    share: Fraction = 0.5
+    after: Positive = 10
+    kept: Positive = 16
+
+
 class NearGoal(StrictSettings):
     """A curriculum of the way that is left: episodes start within demonstrations of the searcher,
     first near the goal, then farther from it (:mod:`agents.rl.near_goal`).

@@ -14,16 +14,19 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from agents.rl.config import EnvConfig
+from agents.rl.object_map import MAP_LAYOUT, ObjectMap
 from agents.rl.sighting_memory import SIGHTING_LAYOUT, SightingMemory
 from agents.rl.subtask_memory import SUBTASK_LAYOUT, SubtaskMemory
-from er_gym.envs.actions import ACTIONS
+from er_gym.envs.actions import ACTIONS, INDEX, Action
 from er_gym.envs.info import with_details
 from er_gym.envs.observations import STATE_LAYOUT
 from er_gym.envs.wrappers import make_encoder
+from er_gym.tasks import verbs
 
 Obs = dict[str, NDArray[Any]]
 IMAGES = {"rgb": 3, "depth": 1}
 """The observations that a network sees as images, with their numbers of channels."""
+_END = INDEX[Action(verbs.END)]
 DEPTH_RANGE = 10.0
 """Metres; few rooms are longer."""
 
@@ -34,6 +37,7 @@ class PolicyObservation:
     - ``state``: as in the environment's observation.
     - ``subtask``: (S,) float32 in [0, 1], see :mod:`agents.rl.subtask_memory`.
     - ``sightings``: (S,) float32 in [0, 1], see :mod:`agents.rl.sighting_memory`.
+    - ``object_map``: (S,) float32 in [0, 1], see :mod:`agents.rl.object_map`.
     - ``instruction``: (E,) float32 in [-1, 1], with an encoder.
     - ``rgb``: (height, width, 3 × frames) uint8, the last pictures, the newest last; at the
       beginning the first is repeated.
@@ -46,6 +50,7 @@ class PolicyObservation:
         self._size = (options.width, options.height)
         self._encode = make_encoder(options.instruction) if options.instruction else None
         self._with_mask = with_mask
+        self._ends_when_done = options.ends_when_done
         entries: dict[str, spaces.Space[Any]] = {
             "state": spaces.Box(-1.0, 1.0, (len(STATE_LAYOUT),), np.float32)
         }
@@ -57,6 +62,10 @@ class PolicyObservation:
         self._sightings: SightingMemory | None = None
         if options.sightings:
             entries["sightings"] = spaces.Box(0.0, 1.0, (len(SIGHTING_LAYOUT),), np.float32)
+        self._with_map = options.object_map
+        self._map: ObjectMap | None = None
+        if options.object_map:
+            entries["object_map"] = spaces.Box(0.0, 1.0, (len(MAP_LAYOUT),), np.float32)
         if self._encode is not None:
             entries["instruction"] = spaces.Box(-1.0, 1.0, (self._encode.dimension,), np.float32)
         self._images: dict[str, deque[NDArray[np.uint8]]] = {
@@ -76,10 +85,11 @@ class PolicyObservation:
         for images in self._images.values():
             images.clear()
         self.subtasks = SubtaskMemory(instruction) if self._with_subtasks else None
-        self._sightings = None
+        self._sightings = self._map = None
         if self._with_sightings:
             assert self.subtasks is not None  # the configuration sees to it
             self._sightings = SightingMemory(self.subtasks.progress)
+            self._map = ObjectMap(self.subtasks.progress) if self._with_map else None
         self._told = self._encode(instruction) if self._encode is not None else None
         return self.observe(obs, info)
 
@@ -94,6 +104,8 @@ class PolicyObservation:
             made["subtask"] = self.subtasks.update(info)
         if self._sightings is not None:
             made["sightings"] = self._sightings.update(info)
+        if self._map is not None:
+            made["object_map"] = self._map.update(obs["state"], info)
         if self._told is not None:
             made["instruction"] = self._told
         for name, images in self._images.items():
@@ -103,18 +115,29 @@ class PolicyObservation:
             images.append(image)
             made[name] = np.concatenate(images, axis=2)
         if self._with_mask:
-            made["mask"] = info["action_mask"]
+            made["mask"] = self.allowed(info)
         return made
+
+    def allowed(self, info: Mapping[str, Any]) -> NDArray[np.int8]:
+        """(A,) int8, the legal actions between which the learner chooses after :meth:`observe`:
+        with ``ends_when_done``, ``end`` is none of them before it is time."""
+        mask: NDArray[np.int8] = info["action_mask"]
+        if self._ends_when_done and info["max_steps"] - info["steps"] > 1:
+            assert self.subtasks is not None  # the configuration sees to it
+            if self.subtasks.progress.at() is not None and mask.sum() > mask[_END]:
+                mask = mask.copy()
+                mask[_END] = 0
+        return mask
 
     def memory(self) -> bytes:
         """What is remembered of the earlier observations, for :meth:`recall` in this program."""
-        kept = self.subtasks, self._sightings, self._told, self._images
+        kept = self.subtasks, self._sightings, self._map, self._told, self._images
         return zlib.compress(pickle.dumps(kept), 1)
 
     def recall(self, memory: bytes) -> None:
         """Remember that in place of this episode's; the next is :meth:`observe`."""
         kept = pickle.loads(zlib.decompress(memory))
-        self.subtasks, self._sightings, self._told, self._images = kept
+        self.subtasks, self._sightings, self._map, self._told, self._images = kept
 
     def _image(self, seen: NDArray[Any]) -> NDArray[np.uint8]:
         """A picture or a depth as (height, width, channels) uint8 of the learner's size."""

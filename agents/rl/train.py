@@ -42,6 +42,7 @@ from agents.rl.callbacks import (
 )
 from agents.rl.config import EnvConfig, Evaluation, TrainConfig, load_config
 from agents.rl.envs import evaluation_config, make_env
+from agents.rl.guidance import LongSearches
 from agents.rl.model_file import placeholder_env, restore, restore_logged_values, save
 from agents.rl.near_goal import check_tasks
 from agents.rl.near_goal_callback import NearGoalCurriculum
@@ -136,7 +137,7 @@ def _train(
     seed = int(np.random.SeedSequence([config.seed, steps]).generate_state(1)[0])
     begin(f"starting {config.vec.envs} environments in {config.vec.workers} workers")
     near = 0.0 if config.near_goal is None else config.near_goal.share
-    env = make_vec_env(config, config.env, seed, near)
+    env = make_vec_env(config, config.env, seed, near, config.long_searches)
     checkpoints = Checkpoints(run, config.checkpoint_every)
     callbacks = [checkpoints, TorchThreads(config.threads), SuccessByType(), *more]
     held_out = None
@@ -236,14 +237,20 @@ def load_last_checkpoint(run: Path) -> BaseAlgorithm | None:
     return model
 
 
-def make_vec_env(config: TrainConfig, options: EnvConfig, seed: int, near: float = 0.0) -> VecEnv:
+def make_vec_env(
+    config: TrainConfig,
+    options: EnvConfig,
+    seed: int,
+    near: float = 0.0,
+    long: LongSearches | None = None,
+) -> VecEnv:
     """Make ``config.vec.envs`` environments in worker processes with consecutive seeds.
 
     Each process plays in its share of the rooms, and starts the share ``near`` of its episodes near
-    their goals.
+    their goals, and others where ``long`` says.
     """
     needs_mask = LEARNERS[config.algorithm.name].needs_mask
-    make = partial(make_env, options, config.algorithm.gamma, needs_mask, near=near)
+    make = partial(make_env, options, config.algorithm.gamma, needs_mask, near=near, long=long)
     env = VecMonitor(WorkerVecEnv([make] * config.vec.envs, config.vec.workers))
     env.seed(seed)
     return env
