@@ -23,7 +23,8 @@ from torch import Tensor
 from torch.nn import functional
 
 from agents.rl.config import TrainConfig
-from agents.rl.guidance import Start
+from agents.rl.guidance import Hints, Start
+from agents.rl.hints import SHOWS
 from agents.rl.network import TypeNetwork
 from agents.rl.policy import TypeFeatures, outputs
 from agents.rl.policy_file import (
@@ -44,14 +45,15 @@ class AnchoredPPO(MaskablePPO):
 
     Args:
         start: its settings.
+        hints: by which it learns what would have shown a thing; None for none.
 
     Attributes:
         anchor: the network of the start; :meth:`begin_from` sets it, or a checkpoint.
     """
 
-    def __init__(self, *args: Any, start: Start, **kwargs: Any) -> None:
+    def __init__(self, *args: Any, start: Start, hints: Hints | None = None, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self._start = start
+        self._start, self._hints = start, hints
         extractor: Any = self.policy.features_extractor
         self.anchor: TypeFeatures = deepcopy(extractor).requires_grad_(False).eval()
 
@@ -133,12 +135,35 @@ class AnchoredPPO(MaskablePPO):
                 "clip_fraction": ((ratio - 1).abs() > clip).float().mean().item(),
                 "kl": far.item(),
             }
-        return loss + weight * far, figures
+        loss = loss + weight * far
+        if self._hints is not None:
+            missed = surprise(distribution.distribution.logits, legal)
+            loss = loss + self._hints.weight * missed.sum() / len(missed)
+            told = (legal == SHOWS).any(dim=1)
+            figures["hints"] = told.float().mean().item()
+            figures["hint_loss"] = missed.sum().item() / max(1, int(told.sum()))
+        return loss, figures
 
     def _anchor_logits(self, obs: Any) -> Tensor:
         with torch.no_grad():
             features: Any = self.policy.extract_features(obs, self.anchor)
             return self.policy.mlp_extractor.forward_actor(features)
+
+
+def surprise(logits: Tensor, told: Tensor) -> Tensor:
+    """-log of the probability of the actions that would show a thing.
+
+    Args:
+        logits: (B, A).
+        told: (B, A), 0 for illegal actions, and :data:`~agents.rl.hints.SHOWS` for those.
+
+    Returns:
+        (B,) nats, 0 or more; 0 in rows that tell of none.
+    """
+    legal = logits.masked_fill(told == 0, _NEVER).log_softmax(dim=1)
+    shown = told == SHOWS
+    likely = legal.masked_fill(~shown, _NEVER).logsumexp(dim=1)
+    return torch.where(shown.any(dim=1), -likely, torch.zeros_like(likely))
 
 
 def divergence(start: Tensor, now: Tensor, legal: Tensor) -> Tensor:

@@ -16,6 +16,7 @@ from pydantic import Field, field_validator, model_validator
 from agents.configs import ConfigKind, StrictSettings, load
 from agents.rl.guidance import (
     Fraction,
+    Hints,
     LongSearches,
     NearGoal,
     Phase,
@@ -47,8 +48,8 @@ class EnvConfig(StrictSettings):
             it has been to, and from where it has looked (:mod:`agents.rl.object_map`); with
             ``sightings``.
         ends_when_done: whether it may ``end`` only once it has done all subtasks, as far as it
-            knows, or at the last step; with ``subtasks``. What is worth a try while steps are left
-            costs nothing, and who gives up does not learn it.
+            knows, or at the last step; with ``subtasks``. A policy that gives up does not learn
+            what else it could have tried.
         instruction: the encoder of the instruction, as
             :func:`er_gym.envs.wrappers.make_encoder` has it; "" for none, since ``state`` says
             which types it names.
@@ -192,6 +193,8 @@ class TrainConfig(StrictSettings):
         near_goal: a curriculum of the key actions that are left at the start; None for none.
         long_searches: where the policy's own episodes go on; None for none. They need
             ``env.subtasks``.
+        hints: by which the policy learns what would have shown a thing; None for none. They need
+            ``start`` and ``env.subtasks``.
         warm_start: behaviour cloning; None for none.
         start: a trained policy to go on from, in place of a warm start; None for none.
         checkpoint_every: steps between two checkpoints; a checkpoint is written after the rollout.
@@ -210,6 +213,7 @@ class TrainConfig(StrictSettings):
     curriculum: tuple[Phase, ...] = ()
     near_goal: NearGoal | None = None
     long_searches: LongSearches | None = None
+    hints: Hints | None = None
     warm_start: WarmStart | None = None
     start: Start | None = None
     network: Network = Network()
@@ -243,8 +247,11 @@ class TrainConfig(StrictSettings):
 
     @model_validator(mode="after")
     def _searches_are_of_subtasks(self) -> TrainConfig:
-        if self.long_searches is not None and not self.env.subtasks:
-            raise ValueError("long_searches are of subtasks: give env.subtasks=true, too")
+        for name in ("long_searches", "hints"):
+            if getattr(self, name) is not None and not self.env.subtasks:
+                raise ValueError(f"{name} are of subtasks: give env.subtasks=true, too")
+        if self.hints is not None and self.start is None:
+            raise ValueError("hints are for a policy that knows how to search: give start, too")
         return self
 
     @model_validator(mode="after")

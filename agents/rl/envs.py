@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any, cast
 
 import gymnasium
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 from agents.rl.adviser import Adviser
 from agents.rl.config import EnvConfig
 from agents.rl.demonstrations import Demonstrations, demonstrate
-from agents.rl.guidance import LongSearches
+from agents.rl.guidance import Hints, LongSearches
+from agents.rl.hints import HintFinder
 from agents.rl.near_goal import (
     LONG_SEARCH,
     MOMENT,
@@ -91,6 +93,7 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         near: the share of episodes that start near the goal, of types with a position.
         long: when an episode goes on from where an earlier one had searched for long; None for
             never.
+        hints: finds out which actions would show a thing; None for none.
     """
 
     looks_after_step = True
@@ -104,8 +107,10 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         options: EnvConfig,
         near: float = 0.0,
         long: LongSearches | None = None,
+        hints: HintFinder | None = None,
     ) -> None:
         super().__init__(env)
+        self._hints = hints
         self._long = long
         self._searches = deque[Moment](maxlen=0 if long is None else long.kept)
         self._near, self._positions = near, dict[str, int]()
@@ -114,6 +119,7 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         self._source, self.policy_observation = source, policy_observation
         self.set_types(types)
         self._rng = np.random.default_rng()
+        self._hint_rng = np.random.default_rng()  # its own, so that hints change no episode
         self.observation_space = policy_observation.space
 
     def set_types(self, types: Sequence[str]) -> None:
@@ -135,6 +141,7 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         """Begin an episode; its task is drawn unless ``options`` name it, or a moment."""
         if seed is not None:
             self._rng = np.random.default_rng(seed)
+            self._hint_rng = np.random.default_rng([seed, 1])
         chosen = options or self._next()
         obs, info = self.env.reset(seed=seed, options=chosen)
         moment: Moment | None = chosen.get(MOMENT)
@@ -189,11 +196,19 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
 
     def _with_choice(self, info: dict[str, Any]) -> dict[str, Any]:
         """``info`` whose mask has the actions between which the learner chooses."""
-        self._mask = info["action_mask"] = self.policy_observation.allowed(info)
+        mask = self.policy_observation.allowed(info)
+        if self._hints is not None:
+            memory, own = self.policy_observation.subtasks, cast(Any, self.unwrapped)
+            assert memory is not None  # the configuration sees to it
+            kind = self._hints.wanted(memory, info, self._hint_rng.random())
+            if kind is not None:
+                mask = self._hints.showing(own.snapshot(), mask, kind)
+        self._mask = info["action_mask"] = mask
         return info
 
     def action_masks(self) -> NDArray[np.int8]:
-        """(A,) int8, the legal actions between which the learner chooses now."""
+        """(A,) int8, not 0 for the legal actions between which the learner chooses now, and with
+        hints :data:`~agents.rl.hints.SHOWS` for those that would show the thing."""
         return self._mask
 
     def demonstrate(self, *asked: Any) -> Demonstrations:
@@ -248,6 +263,7 @@ def make_env(
     advised: bool = False,
     near: float = 0.0,
     long: LongSearches | None = None,
+    hints: Hints | None = None,
     share: tuple[int, int] = (0, 1),
 ) -> gymnasium.Env[Obs, Any]:
     """Make a training environment.
@@ -260,23 +276,14 @@ def make_env(
             scripted agents need.
         advised: whether the observation holds the searcher's advice; for options with subtasks.
         near, long: which episodes start elsewhere than at their beginning (:class:`LearningEnv`).
+        hints: in which states the masks tell what would show a thing.
         share: ``(index, count)`` of the worker process; each plays in its own rooms.
 
     Raises:
         ValueError: the suite, the encoder or the reward wrapper does not exist.
         TaskFileError: the suite has not been built, or its file is damaged. (It is a ValueError.)
     """
-    member = MemberEnv(
-        (),
-        obs_mode=f"{options.needed_obs_mode}+text" if with_text else options.needed_obs_mode,
-        width=options.width,
-        height=options.height,
-        instances=options.instances,
-        step_penalty=options.step_penalty,
-        illegal_penalty=options.illegal_penalty,
-        faults=options.faults,
-        max_steps=options.max_steps,
-    )
+    member = _member(options, f"{options.needed_obs_mode}{'+text' * with_text}")
     env: gymnasium.Env[Any, Any] = TrainingRules(
         StartsWithin(member), options.success_bonus, options.key_actions
     )
@@ -287,8 +294,29 @@ def make_env(
     if isinstance(source, TaskList):
         source = source.share(*share)
     observation = PolicyObservation(options, with_mask)
-    learning = LearningEnv(env, source, options.types, observation, options, near, long)
+    finder = None if hints is None else _finder(hints, options)
+    learning = LearningEnv(env, source, options.types, observation, options, near, long, finder)
     return AdvisedEnv(learning) if advised else learning
+
+
+def _member(options: EnvConfig, obs_mode: str) -> MemberEnv:
+    return MemberEnv(
+        (),
+        obs_mode=obs_mode,
+        width=options.width,
+        height=options.height,
+        instances=options.instances,
+        step_penalty=options.step_penalty,
+        illegal_penalty=options.illegal_penalty,
+        faults=options.faults,
+        max_steps=options.max_steps,
+    )
+
+
+@lru_cache(maxsize=1)
+def _finder(hints: Hints, options: EnvConfig) -> HintFinder:
+    """That of this process, shared by its environments."""
+    return HintFinder(hints, _member(options, "state"))
 
 
 def evaluation_config(options: EnvConfig, episodes: str) -> EnvConfig:

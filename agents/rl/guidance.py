@@ -94,8 +94,8 @@ class Phase(StrictSettings):
 class LongSearches(StrictSettings):
     """Episodes that start where an episode of the policy itself has been at one subtask for long.
 
-    Such states are few, and in them is most of what a good policy has still to learn. They are
-    kept whatever came of them, so in each the policy meets what it would meet in play.
+    A good policy seldom comes into such states, and when it fails it has mostly been in one. They
+    are kept whatever came of them, so in each the policy meets what it would meet in play.
 
     Attributes:
         share: of all episodes that start so, once there are such states.
@@ -106,6 +106,23 @@ class LongSearches(StrictSettings):
     share: Fraction = 0.5
     after: Positive = 10
     kept: Positive = 16
+
+
+class Hints(StrictSettings):
+    """What would have shown the thing that the policy looks for: in some states of long searches,
+    in which it has not been seen clearly, the actions that may show it are tried, by branching, and
+    those that do become likelier (:mod:`agents.rl.hints`).
+
+    Attributes:
+        weight: in the loss, of -log of the probability of the actions that show it. The mean is
+            over all steps, those without a hint included, so more hints have more weight together.
+        after: the steps since the subtask began.
+        share: of such states, in which it is tried.
+    """
+
+    weight: float = Field(2.0, ge=0)
+    after: Positive = 6
+    share: Fraction = 0.05
 
 
 class NearGoal(StrictSettings):

@@ -8,7 +8,8 @@ another place, and to go to something that stands near it is how the agent gets 
 
 Positions follow from the bearing and distance of what is in view
 (:class:`er_gym.envs.object_view.ObjectView`) and from the agent's own position in ``state``, both
-relative to where the episode began. Objects of a type are told apart by their ids.
+relative to where the episode began; ``state`` tells it up to ten metres from there. Objects of a
+type are told apart by their ids.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ twenty.
 - ``unopened``: how many it has never seen open, of those in which the thing that it looks for may
   be: where the instruction says, or else where AI2-THOR allows to put it;
 - ``covered``: how many are open where another of the type is open, above or below it;
-- ``next …``: of the one to which ``navigate to`` goes next, the nearest not yet visited:
+- ``next …``: of the known one to which ``navigate to`` goes next, the nearest not yet visited
+  (with ``instances: explore``, if none that was never seen is nearer):
   ``open``: whether it was open when last seen; ``on fitting``: whether it lay then on or in
   something where the thing may be; ``new``: how far it is from all places where the agent has been
   since the subtask began, 0 at no distance, 1 - 1/e at one metre; ``looks``: at how many steps
@@ -77,6 +79,7 @@ class ObjectMap:
         self._number = -1  # of the subtask at the last step
         self._column: dict[str, int] = {}  # by object
         self._facts = np.zeros((len(_FACTS), 64))
+        self._visited: dict[str, set[str]] = {}  # by type: the objects navigated to
         self._stands: list[tuple[float, float]] = []
 
     def update(self, state: NDArray[np.float32], info: Mapping[str, Any]) -> NDArray[np.float32]:
@@ -110,6 +113,8 @@ class ObjectMap:
             column = self._column.setdefault(view.object_id, len(self._column))
             if column == self._facts.shape[1]:
                 self._facts = np.concatenate([self._facts, np.zeros_like(self._facts)], axis=1)
+            visited = self._visited.get(view.object_type, ())
+            self._facts[_VISITED, column] = view.object_id in visited
             self._facts[:_LATER, column] = (
                 right + view.distance * sin(angle),
                 ahead + view.distance * cos(angle),
@@ -126,14 +131,17 @@ class ObjectMap:
         """Note what the agent went to, opened, closed or picked up."""
         verb, name = info["verb"], info["object_id"]
         column = self._column.get(name)
-        if column is None:
-            return
-        known = self._facts[:, column]
-        if verb == verbs.NAVIGATE:
-            if known[_VISITED]:  # all have been visited, and a new round begins
-                self._facts[_VISITED, self._facts[_KIND] == known[_KIND]] = False
-            known[_VISITED] = True
-        elif info["action_success"]:
+        known = None if column is None else self._facts[:, column]
+        if verb == verbs.NAVIGATE and name:
+            visited = self._visited.setdefault(info["object_type"], set())
+            if name in visited:  # all have been visited, and a new round begins
+                visited.clear()
+                kind = KIND_OF.get(info["object_type"], _NOWHERE)
+                self._facts[_VISITED, self._facts[_KIND] == kind] = False
+            visited.add(name)
+            if known is not None:
+                known[_VISITED] = True
+        elif known is not None and info["action_success"]:
             if verb in (verbs.OPEN, verbs.CLOSE):
                 known[_OPEN], known[_WAS_OPEN] = verb == verbs.OPEN, True
             elif verb == verbs.PICKUP:
@@ -177,13 +185,10 @@ class ObjectMap:
         """(T,) whether the thing that the agent looks for may be in or on each type."""
         holders, now = np.zeros(len(TYPES), bool), self._progress.at()
         if now is not None:
-            sought, source = now.thing, now.source
-            if now.verb == verbs.PUT:
-                sought, source = now.place, ""
-            if source in KIND_OF:
-                holders[KIND_OF[source]] = True
-            elif sought in FITS:
-                holders[FITS[sought]] = True
+            if now.source in KIND_OF:
+                holders[KIND_OF[now.source]] = True
+            elif now.sought in FITS:
+                holders[FITS[now.sought]] = True
         return holders
 
 

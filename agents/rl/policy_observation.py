@@ -124,7 +124,7 @@ class PolicyObservation:
         mask: NDArray[np.int8] = info["action_mask"]
         if self._ends_when_done and info["max_steps"] - info["steps"] > 1:
             assert self.subtasks is not None  # the configuration sees to it
-            if self.subtasks.progress.at() is not None and mask.sum() > mask[_END]:
+            if self.subtasks.progress.at() is not None:  # observe is always legal, too
                 mask = mask.copy()
                 mask[_END] = 0
         return mask

@@ -47,6 +47,11 @@ class Subtask:
         return {verbs.PUT: self.thing, verbs.SLICE: self.place}.get(self.verb, "")
 
     @property
+    def sought(self) -> str:
+        """The type that must be found: for ``put in`` that of the receptacle."""
+        return self.place if self.verb == verbs.PUT else self.thing
+
+    @property
     def action(self) -> Action | None:
         """The action that completes it; None for ``find``."""
         if self.verb == FIND:

@@ -42,7 +42,6 @@ from agents.rl.callbacks import (
 )
 from agents.rl.config import EnvConfig, Evaluation, TrainConfig, load_config
 from agents.rl.envs import evaluation_config, make_env
-from agents.rl.guidance import LongSearches
 from agents.rl.model_file import placeholder_env, restore, restore_logged_values, save
 from agents.rl.near_goal import check_tasks
 from agents.rl.near_goal_callback import NearGoalCurriculum
@@ -137,7 +136,8 @@ def _train(
     seed = int(np.random.SeedSequence([config.seed, steps]).generate_state(1)[0])
     begin(f"starting {config.vec.envs} environments in {config.vec.workers} workers")
     near = 0.0 if config.near_goal is None else config.near_goal.share
-    env = make_vec_env(config, config.env, seed, near, config.long_searches)
+    make = partial(make_env, near=near, long=config.long_searches, hints=config.hints)
+    env = make_vec_env(config, config.env, seed, make)
     checkpoints = Checkpoints(run, config.checkpoint_every)
     callbacks = [checkpoints, TorchThreads(config.threads), SuccessByType(), *more]
     held_out = None
@@ -238,20 +238,18 @@ def load_last_checkpoint(run: Path) -> BaseAlgorithm | None:
 
 
 def make_vec_env(
-    config: TrainConfig,
-    options: EnvConfig,
-    seed: int,
-    near: float = 0.0,
-    long: LongSearches | None = None,
+    config: TrainConfig, options: EnvConfig, seed: int, make: Callable[..., Any] = make_env
 ) -> VecEnv:
     """Make ``config.vec.envs`` environments in worker processes with consecutive seeds.
 
-    Each process plays in its share of the rooms, and starts the share ``near`` of its episodes near
-    their goals, and others where ``long`` says.
+    Each process plays in its share of the rooms.
+
+    Args:
+        make: :func:`agents.rl.envs.make_env`, and what of its arguments is for training alone.
     """
     needs_mask = LEARNERS[config.algorithm.name].needs_mask
-    make = partial(make_env, options, config.algorithm.gamma, needs_mask, near=near, long=long)
-    env = VecMonitor(WorkerVecEnv([make] * config.vec.envs, config.vec.workers))
+    one = partial(make, options, config.algorithm.gamma, needs_mask)
+    env = VecMonitor(WorkerVecEnv([one] * config.vec.envs, config.vec.workers))
     env.seed(seed)
     return env
 

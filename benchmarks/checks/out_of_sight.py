@@ -3,10 +3,12 @@
     python -m benchmarks.checks.out_of_sight RUN... [--steps 2]
 
 It plays the failures of runs of ``er-gym bench`` again in which something that the task fetches or
-looks for never came within the agent's reach. Where the agent had gone to its place, and had opened
-that if it must be opened, it tries everything that it could do right then: another open drawer
-covers the thing, or something stands before it, and from a step aside it is seen. The table says in
-how many of the failures one action does that, or two.
+looks for never came within the agent's reach. Where the agent had gone to its place (the object
+that the key actions name), and had opened that if it must be opened, it tries what the agent could
+do right then to bring the thing within reach: to close another drawer that covers it, or to go to
+something that stands near it. The table says in how many of the failures one action does that, or
+two; in how many of these one of them closes something; and in how many neither does, or the
+episode was over. Tasks in one arrangement of a room may miss the same thing, and count each.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from benchmarks.harness.output import progress
 from benchmarks.monitor.world import CannotReplay, action_in, environment_of, task_of
 from benchmarks.scoring.report import load_run
 from benchmarks.scoring.scorers import CORRECTED
-from er_gym.envs.actions import ACTIONS
+from er_gym.envs.actions import ACTIONS, Action
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.envs.info import names
 from er_gym.rollout.records import EpisodeRecord
@@ -32,8 +34,11 @@ from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
 
 _LOOKS = {verbs.NAVIGATE, verbs.OPEN, verbs.CLOSE, verbs.OBSERVE, verbs.MOVE_FORWARD}
-_TRIED = [number for number, action in enumerate(ACTIONS) if action.verb in _LOOKS]
-NOT_THERE, NEVER = "not there", "more"
+_TRIED = sorted(
+    (number for number, action in enumerate(ACTIONS) if action.verb in _LOOKS),
+    key=lambda number: ACTIONS[number].verb != verbs.CLOSE,  # so it is found if closing does it
+)
+NOT_THERE, NEVER, CLOSING = "not there", "more", "closing"
 
 
 class Lost(NamedTuple):
@@ -73,8 +78,9 @@ def looked_at(lost: Lost, record: EpisodeRecord) -> int | None:
     return None
 
 
-def actions_to_see(env: EmbodiedEnv, thing: str, most: int) -> int | None:
-    """How many actions at least bring a thing within reach from where an episode is.
+def actions_to_see(env: EmbodiedEnv, thing: str, most: int) -> tuple[Action, ...]:
+    """The fewest actions that bring a thing within reach from where an episode is; () if none were
+    found.
 
     Args:
         env: its episode is lost.
@@ -82,41 +88,41 @@ def actions_to_see(env: EmbodiedEnv, thing: str, most: int) -> int | None:
         most: actions; more are not tried.
     """
     seen = set[object]()
-    frontier = [env.snapshot()]
-    for number in range(1, most + 1):
+    frontier: list[tuple[bytes, tuple[Action, ...]]] = [(env.snapshot(), ())]
+    for _ in range(most):
         following = []
-        for snapshot in frontier:
+        for snapshot, path in frontier:
             legal = env.restore(snapshot)[1]["action_mask"]
             for action in (each for each in _TRIED if legal[each]):
                 env.restore(snapshot)
                 info = env.step(action)[4]
+                longer = (*path, ACTIONS[action])
                 if thing in names(info["interactable_mask"]):
-                    return number
+                    return longer
                 where = env.agent_pose, info["action_mask"].tobytes()
                 if not info["end_reason"] and where not in seen:
                     seen.add(where)
-                    following.append(env.snapshot())
+                    following.append((env.snapshot(), longer))
         frontier = following
-    return None
+    return ()
 
 
-def _outcome(env: EmbodiedEnv, task: Task, record: EpisodeRecord, most: int) -> str | None:
-    """What would have shown the thing that an episode did not find; None if it found all."""
+def _outcome(env: EmbodiedEnv, task: Task, record: EpisodeRecord, most: int) -> list[str]:
+    """What would have shown the thing that an episode did not find; [] if it found all."""
     lost = lost_thing(task, record)
     if lost is None:
-        return None
+        return []
     there = looked_at(lost, record)
     if there is None:
-        return NOT_THERE
+        return [NOT_THERE]
     info: Any = env.reset(seed=record.seed, options={"task": task})[1]
     for step in record.steps[1 : there + 1]:
         info = env.step(action_in(step.verb, step.object_type))[4]
         if bool(info["action_success"]) != step.success:
             raise click.ClickException(f"{record.task_id} comes out otherwise than it is recorded")
-    if info["end_reason"]:
-        return NEVER
-    number = actions_to_see(env, lost.thing, most)
-    return NEVER if number is None else str(number)
+    path = () if info["end_reason"] else actions_to_see(env, lost.thing, most)
+    closes = any(action.verb == verbs.CLOSE for action in path)
+    return [str(len(path)) if path else NEVER, *([CLOSING] if closes else [])]
 
 
 def _failures(path: Path) -> Iterator[EpisodeRecord]:
@@ -131,12 +137,11 @@ def _row(path: Path, most: int) -> tuple[str, ...]:
     manifest = RunDirectory.open(path).manifest
     env, counts = environment_of(manifest), Counter[str]()
     for record in progress(failures, path.name, len(failures)):
-        outcome = _outcome(env, task_of(manifest, record), record, most)
-        if outcome is not None:
-            counts[outcome] += 1
+        counts.update(_outcome(env, task_of(manifest, record), record, most))
     env.close()
-    columns = [NOT_THERE, *map(str, range(1, most + 1)), NEVER]
-    shown = [len(failures), counts.total(), *(counts[name] for name in columns)]
+    columns = [NOT_THERE, *map(str, range(1, most + 1)), CLOSING, NEVER]
+    lost = counts.total() - counts[CLOSING]
+    shown = [len(failures), lost, *(counts[name] for name in columns)]
     return path.name, *map(str, shown)
 
 
@@ -151,7 +156,7 @@ def main(runs: Sequence[Path], steps: int) -> None:
     except (RunDirectoryError, CannotReplay) as error:
         raise click.ClickException(str(error)) from error
     actions = [f"{number} action{'s' * (number > 1)}" for number in range(1, steps + 1)]
-    columns = ("Run", "Failures", "Not found", "Never looked there", *actions, "More")
+    columns = ("Run", "Failures", "Not found", "Never looked there", *actions, "By closing", "More")
     click.echo(as_markdown([Table("What would have shown the thing", columns, rows, 1)]))
 
 

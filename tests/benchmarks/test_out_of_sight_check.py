@@ -9,7 +9,15 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from benchmarks.checks.out_of_sight import Lost, actions_to_see, looked_at, lost_thing, main
+from benchmarks.checks.out_of_sight import (
+    NOT_THERE,
+    Lost,
+    _outcome,
+    actions_to_see,
+    looked_at,
+    lost_thing,
+    main,
+)
 from benchmarks.cli.main import cli as er_gym
 from er_gym.envs.embodied_env import EmbodiedEnv
 from er_gym.tasks import load_suite, verbs
@@ -51,12 +59,33 @@ def test_the_fewest_actions_that_show_a_thing(hidden: Task) -> None:
     assert lost is not None
     with EmbodiedEnv(obs_mode="state", instances="target") as env:
         env.reset(options={"task": hidden})
-        assert actions_to_see(env, lost.thing, 1) is None
+        assert actions_to_see(env, lost.thing, 1) == ()
         env.reset(options={"task": hidden})
-        assert actions_to_see(env, lost.thing, 2) == 2
+        path = actions_to_see(env, lost.thing, 2)
+        assert [each.verb for each in path] == [verbs.NAVIGATE, verbs.OPEN]
         env.reset(options={"task": hidden})
         env.step(f"navigate to {type_of_id(lost.place)}")
-        assert actions_to_see(env, lost.thing, 2) == 1
+        assert [each.verb for each in actions_to_see(env, lost.thing, 2)] == [verbs.OPEN]
+
+
+def test_what_would_have_shown_it(hidden: Task) -> None:
+    """An agent opens the place, and misses the thing before it."""
+    lost = lost_thing(hidden, record())
+    assert lost is not None
+    steps = [
+        (verbs.INIT, "", ""),
+        *((v, lost.place, type_of_id(lost.place)) for v in (verbs.NAVIGATE, verbs.OPEN)),
+    ]
+    made = [
+        SimpleNamespace(verb=verb, object_id=where, object_type=kind, success=True, interactable=())
+        for verb, where, kind in steps
+    ]
+    with EmbodiedEnv(obs_mode="state", instances="target") as env:
+        for number, outcome in ((3, "1"), (2, NOT_THERE)):
+            episode: Any = SimpleNamespace(steps=made[:number], seed=0, task_id=hidden.id)
+            assert _outcome(env, hidden, episode, 1) == [outcome]
+        found = SimpleNamespace(steps=[SimpleNamespace(interactable=(lost.thing,))])
+        assert _outcome(env, hidden, found, 1) == []  # type: ignore[arg-type]
 
 
 def test_the_table_of_runs(tmp_path: Path) -> None:
@@ -67,9 +96,9 @@ def test_the_table_of_runs(tmp_path: Path) -> None:
     shown = CliRunner().invoke(main, [run, "--steps", "1"])
     assert shown.exit_code == 0, shown.output
     [row] = [line for line in shown.output.splitlines() if line.startswith("| run")]
-    failures, lost, *parts = map(int, row.split("|")[2:-1])
-    assert 12 >= failures >= lost == sum(parts) > 0
-    assert len(parts) == 3
+    failures, lost, elsewhere, one, closing, more = map(int, row.split("|")[2:-1])
+    assert 12 >= failures >= lost == elsewhere + one + more > 0
+    assert closing <= one
     missing = CliRunner().invoke(main, [str(tmp_path / "none")])
     assert missing.exit_code == 1
     assert "is no run" in missing.output

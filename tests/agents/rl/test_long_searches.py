@@ -79,8 +79,32 @@ def check(then: list[Any], actions: list[int], moment: Any) -> None:
         for name in one:
             assert np.array_equal(one[name], seen[name]), name
         assert gained is reward is None or gained == pytest.approx(reward)
-    assert len(other._searches) == 1  # of its own episodes from their beginning
     other.close()
+
+
+def test_only_episodes_from_their_beginning_are_kept() -> None:
+    """In an episode that goes on from a kept state, another subtask may take long, too."""
+    env: Any = make_env(OPTIONS, long=LongSearches(share=1.0, after=AFTER))
+    random, later = np.random.default_rng(2), 0
+    env.reset(seed=3)
+    for _ in range(40):
+        _, info = env.reset()
+        began, kept, over = info["started_at"], list(env._searches), False
+        while not over:
+            _, _, terminated, truncated, info = env.step(
+                int(random.choice(choices(info["action_mask"])))
+            )
+            over = terminated or truncated
+            if began and not over and env.policy_observation.subtasks.moved_on:
+                env.policy_observation.subtasks.since = 0
+                later += 1
+            if began and random.random() < 0.2:
+                env.policy_observation.subtasks.since = AFTER - 2
+                later += 1
+        if began:
+            assert list(env._searches) == kept
+    assert later > 20
+    env.close()
 
 
 def test_so_many_start_so(make_config: Any) -> None:

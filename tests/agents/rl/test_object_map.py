@@ -25,7 +25,7 @@ from er_gym.envs.info import names
 from er_gym.envs.object_view import ObjectView
 from er_gym.envs.observations import SCALARS, STATE_LAYOUT
 from er_gym.tasks import verbs
-from er_gym.thor.objects import TYPES
+from er_gym.thor.objects import KIND_OF, TYPES
 
 
 def drawer(number: int, right: float, ahead: float, is_open: bool = False) -> ObjectView:
@@ -55,14 +55,15 @@ def step(
     did: str = "",
     to: str = "",
     success: bool = True,
-    **around: tuple[ObjectView, ...],
+    around: dict[str, tuple[ObjectView, ...]] | None = None,
 ) -> dict[str, Any]:
     return {
         "verb": did,
         "object_id": to,
+        "object_type": to.partition("|")[0],
         "action_success": success,
         "object_views": ahead,
-        "object_views_around": around,
+        "object_views_around": around or {},
     }
 
 
@@ -72,7 +73,7 @@ def marked(vector: np.ndarray, feature: str) -> dict[str, float]:
     return {TYPES[kind]: float(row[kind]) for kind in row.nonzero()[0]}
 
 
-def count(number: int) -> float:
+def count(number: int) -> Any:
     return pytest.approx(log1p(number) / log1p(20))
 
 
@@ -108,7 +109,7 @@ def test_positions_do_not_depend_on_where_it_looks(name: str, turned: float) -> 
     for at, info in (
         (state(), step(ObjectView("Desk|1", "Desk", 90.0, 2.0))),
         (state(2.0, 3.0, 180.0), step(ObjectView("Desk|1", "Desk", 0.0, 3.0))),
-        (state(0.0, 0.0, 90.0 - turned), step(**{name: (seen_there,)})),
+        (state(0.0, 0.0, 90.0 - turned), step(around={name: (seen_there,)})),
     ):
         memory = ObjectMap(Progress("Pick up the Mug."))
         memory.update(at, info)
@@ -191,6 +192,19 @@ def test_in_a_room_it_knows_where_it_goes_next() -> None:
     assert isinstance(space, spaces.Box)
     assert space.shape == (len(MAP_LAYOUT),)
     random, checked = np.random.default_rng(0), Counter[str]()
+
+    def next_of(place: str) -> str:
+        """The nearest known one that was not visited."""
+        known = env.policy_observation._map
+        at = np.array([obs["state"][SCALARS.index(name)] * 10 for name in ("right", "ahead")])
+        fresh = {
+            name: float(np.hypot(*(known._facts[:2, column] - at)))
+            for name, column in known._column.items()
+            if name not in known._visited.get(place, ())
+            and KIND_OF[place] == known._facts[2, column]
+        }
+        return min(fresh, key=fresh.__getitem__, default="")
+
     env.reset(seed=5)
     for _ in range(8):
         obs, info = env.reset()
@@ -201,15 +215,19 @@ def test_in_a_room_it_knows_where_it_goes_next() -> None:
             legal = np.flatnonzero(info["action_mask"])
             action = Action(verbs.NAVIGATE, place)
             number = INDEX[action] if random.random() < 0.6 else int(random.choice(legal[1:]))
+            following = next_of(place)
             obs, _, over, _, info = env.step(number)
             if number == INDEX[action] and info["action_success"]:
                 fewer = marked(obs["object_map"], "unvisited").get(place, 0.0)
                 checked["fewer"] += place in unvisited and fewer < unvisited[place]
                 checked["all"] += place in unvisited
+                checked["next"] += bool(following) and info["object_id"] == following
+                checked["any"] += bool(following)
             if over:
                 break
     # Unless others of the type come into view.
     assert checked["fewer"] > 0.7 * checked["all"] > 20
+    assert checked["next"] > 0.8 * checked["any"] > 20  # or one that was never seen is nearer
     env.close()
 
 
