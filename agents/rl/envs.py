@@ -111,6 +111,7 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
     ) -> None:
         super().__init__(env)
         self._hints = hints
+        self._mask: NDArray[np.int8] | None = None
         self._long = long
         self._searches = deque[Moment](maxlen=0 if long is None else long.kept)
         self._near, self._positions = near, dict[str, int]()
@@ -208,7 +209,15 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
 
     def action_masks(self) -> NDArray[np.int8]:
         """(A,) int8, not 0 for the legal actions between which the learner chooses now, and with
-        hints :data:`~agents.rl.hints.SHOWS` for those that would show the thing."""
+        hints :data:`~agents.rl.hints.SHOWS` for those that would show the thing.
+
+        Raises:
+            ResetNeeded: no episode has begun.
+        """
+        if self._mask is None:
+            own: Any = self.unwrapped
+            own.action_masks()  # raises it
+        assert self._mask is not None
         return self._mask
 
     def demonstrate(self, *asked: Any) -> Demonstrations:

@@ -18,6 +18,7 @@ from agents.rl.envs import make_env
 from agents.rl.policy_file import MODEL, load_network
 from agents.rl.vec_env import WorkerVecEnv
 from er_gym.envs.actions import ACTIONS, INDEX, Action
+from er_gym.envs.errors import ResetNeeded
 from er_gym.envs.info import with_details
 from er_gym.tasks import verbs
 
@@ -35,6 +36,8 @@ def allowed_differs(mask: np.ndarray, legal: np.ndarray) -> list[int]:
 @pytest.mark.parametrize("with_mask", [False, True])
 def test_it_may_end_once_it_is_done_or_at_the_last_step(with_mask: bool) -> None:
     env: Any = make_env(OPTIONS, with_mask=with_mask)
+    with pytest.raises(ResetNeeded):
+        env.action_masks()
     done_early = tried = 0
     env.reset(seed=3)
     for episode in range(12):
