@@ -19,23 +19,13 @@ import click
 
 from benchmarks.scoring.metrics import Estimate, between, success_rate
 from benchmarks.scoring.report import RunReport, load_run
-from benchmarks.scoring.samples import group_by
+from benchmarks.scoring.samples import arrangement_of, group_by
 from benchmarks.scoring.scorers import CORRECTED
 from er_gym.rollout.run_directory import RunDirectoryError
 from er_gym.tables import Table, as_markdown
 
 _COLUMNS = ("Run", "Tasks", "Arrangements")
 _INTERVALS = ("By tasks", "By arrangements")
-
-
-def arrangement_of(scene: str, task_id: str) -> str:
-    """The room of a task, and which of its arrangements.
-
-    The id of a generated task begins with the scene and, if the scene is rearranged, a number.
-    Others are of the scene as it was recorded.
-    """
-    number = task_id.removeprefix(f"{scene}-").partition("-")[0]
-    return f"{scene}-{number}" if number.isdigit() and task_id.startswith(f"{scene}-") else scene
 
 
 class _Played(NamedTuple):

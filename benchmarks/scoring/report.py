@@ -17,10 +17,17 @@ from benchmarks.scoring.metrics import (
     Score,
     Summary,
     score_episode,
+    success_rate,
     summarise,
     summarise_by,
 )
-from benchmarks.scoring.samples import TaskSamples, group_by, most_samples, task_samples
+from benchmarks.scoring.samples import (
+    TaskSamples,
+    arrangement_of,
+    group_by,
+    most_samples,
+    task_samples,
+)
 from benchmarks.scoring.scorers import CORRECTED, PAPER, SCORERS
 from er_gym.rollout.causes import CauseCount, causes_in, count_causes
 from er_gym.rollout.judgement import lacks_search_targets
@@ -135,6 +142,38 @@ class RunReport:
         return self.scores
 
 
+@dataclass(frozen=True)
+class BetweenArrangements:
+    """Success with the interval that other arrangements of rooms would give.
+
+    Tasks of one arrangement fail together where it hides a thing well, so this interval is wider
+    than one that counts tasks as independent.
+
+    Attributes:
+        arrangements: how many different ones were played.
+        success: with Wilson's interval, for the number of episodes in different arrangements that
+            would tell as much.
+    """
+
+    arrangements: int
+    success: Estimate
+
+
+def between_arrangements(
+    episodes: Sequence[EpisodeRecord], scores: Sequence[Score]
+) -> BetweenArrangements | None:
+    """Success by arrangement; None if no two tasks share one.
+
+    Args:
+        episodes, scores: (n,) what was played, and what it scored.
+    """
+    where = [arrangement_of(episode.scene, episode.task_id) for episode in episodes]
+    different = len(set(where))
+    if different == len({each.task_id for each in scores}):
+        return None
+    return BetweenArrangements(different, success_rate(where, [each.success for each in scores]))
+
+
 def load_run(path: Path) -> RunReport:
     """Read and score a run directory.
 
@@ -233,6 +272,7 @@ def _run(run: RunReport) -> dict[str, Any]:
                     for level, part, summary in slices(scores)
                 ],
                 **_samples(scores),
+                **_between(between_arrangements(run.episodes, scores)),
                 "episodes": [_score(each) for each in scores],
             }
             for name, scores in run.scores.items()
@@ -253,6 +293,10 @@ def _samples(scores: Sequence[Score]) -> dict[str, Any]:
         for level, name, counted in sample_slices(scores)
     ]
     return {"samples": found} if found else {}
+
+
+def _between(found: BetweenArrangements | None) -> dict[str, Any]:
+    return {} if found is None else {"between_arrangements": dataclasses.asdict(found)}
 
 
 def _cells(estimate: Estimate | None) -> tuple[float | None, ...]:

@@ -33,6 +33,16 @@ def most_samples(scores: Iterable[Sampled]) -> int:
     return max(Counter(each.task_id for each in scores).values(), default=0)
 
 
+def arrangement_of(scene: str, task_id: str) -> str:
+    """The room of a task, and which of its arrangements.
+
+    The id of a generated task begins with the scene and, if the scene is rearranged, a number.
+    Others are of the scene as it was recorded.
+    """
+    number = task_id.removeprefix(f"{scene}-").partition("-")[0]
+    return f"{scene}-{number}" if number.isdigit() and task_id.startswith(f"{scene}-") else scene
+
+
 def variance_between(tasks: Sequence[str], values: Sequence[float]) -> float | None:
     """The variance of the mean of some values, each of an episode of a task.
 

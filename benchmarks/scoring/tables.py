@@ -14,7 +14,14 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from benchmarks.scoring.metrics import METRICS, TIDY, Estimate, Score
-from benchmarks.scoring.report import BOTH, RunReport, by_group, sample_slices, slices
+from benchmarks.scoring.report import (
+    BOTH,
+    RunReport,
+    between_arrangements,
+    by_group,
+    sample_slices,
+    slices,
+)
 from benchmarks.scoring.samples import most_samples
 from benchmarks.terminal import without_control_codes
 from er_gym.envs.protocol import DEFAULT
@@ -29,6 +36,10 @@ _MOST_IN_FULL = 4
 _WORDS_WIDTH = 18
 """Columns of words are not folded to less than this many characters."""
 _GAP = 2
+_BY_ARRANGEMENT = "Success, by arrangement"
+_ALIKE = (
+    "By arrangement of the rooms, of which there are n: the interval for a suite with other ones"
+)
 
 
 def tables(
@@ -141,6 +152,9 @@ def _metrics(run: RunReport, scorer: str, scores: Sequence[Score]) -> Table:
         for group, summary in by_group(scores).items()
     ]
     between = ", between tasks" if most_samples(scores) > 1 else ""
+    alike = between_arrangements(run.episodes, scores)
+    if alike is not None:
+        lines.insert(1, (_BY_ARRANGEMENT, alike.arrangements, alike.success))
     return Table(
         title=f"{run.path}, scorer {scorer}: every metric, in %",
         head=("", "n", "Mean", "95 %"),
@@ -152,6 +166,7 @@ def _metrics(run: RunReport, scorer: str, scores: Sequence[Score]) -> Table:
         notes=(
             f"95 %: Wilson's interval of success{' and tidy success' * (TIDY in known)}, 1.96 "
             f"standard errors{between} of the others",
+            *(_ALIKE,) * (alike is not None),
         ),
     )
 

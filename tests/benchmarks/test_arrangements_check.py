@@ -9,9 +9,10 @@ from statistics import NormalDist
 import pytest
 from click.testing import CliRunner
 
-from benchmarks.checks.arrangements import arrangement_of, main
+from benchmarks.checks.arrangements import main
 from benchmarks.cli.main import cli as er_gym
 from benchmarks.scoring.metrics import between, wilson
+from benchmarks.scoring.samples import arrangement_of
 
 
 @pytest.mark.parametrize(

@@ -96,6 +96,26 @@ def test_every_metric_has_its_interval(run):
     assert len(tables([run] * 3)) == 1
 
 
+def test_success_by_arrangement_of_the_rooms(run_directory, episode):
+    for arrangement, actions in (("7", KEYS), ("9", ())):
+        for kind in ("pickup_and_put-Egg", "pickup_and_put-Cup"):
+            task = f"FloorPlan1-{arrangement}-{kind}"
+            run_directory.write(episode(KEYS, actions, task_id=task))
+    run = load_run(run_directory.path)
+    # Both tasks of an arrangement end alike, so two arrangements tell no more than two tasks.
+    *_, table = tables([run], scorer="corrected")
+    rows = {name: cells for name, *cells in table.rows}
+    assert rows["Success"] == ["4", "50.00", "15.0 to 85.0"]
+    assert rows["Success, by arrangement"] == ["2", "50.00", "9.5 to 90.5"]
+    assert any("arrangement of the rooms" in note for note in table.notes)
+    (data,) = json.loads(report.as_json([run]))["runs"]
+    told = data["scorers"]["corrected"]["between_arrangements"]
+    assert told["arrangements"] == 2
+    assert told["success"]["low"] == pytest.approx(0.0945, abs=1e-4)
+    # Where each task has an arrangement of its own, there is nothing to add.
+    assert report.between_arrangements(run.episodes[1:3], run.scores["corrected"][1:3]) is None
+
+
 def test_where_they_agree_there_is_one(run_directory, episode):
     run_directory.write(episode(KEYS, KEYS))
     overview = tables([load_run(run_directory.path)])[0]
