@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping
+from functools import cache
 from hashlib import blake2b
 from typing import Any
 
@@ -74,6 +75,7 @@ def _digest(packed: bytes) -> bytes:
     return blake2b(packed, digest_size=_DIGEST).digest()
 
 
+@cache
 def vocabulary() -> str:
     """A name of the object types and actions that a snapshot refers to by number."""
     text = "\n".join((*TYPES, *map(str, ACTIONS)))
