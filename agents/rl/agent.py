@@ -63,8 +63,8 @@ class RLAgent:
     """The policy of a run directory; it acts deterministically.
 
     Its observations are made as in training: pictures have the same size, and instructions the same
-    encoding. From ``info`` it reads the action mask and what ``env.subtasks``, ``env.sightings``
-    and ``env.object_map`` name; the last two need details (:func:`er_gym.envs.info.with_details`).
+    encoding. From ``info`` it reads the action mask and what ``env.subtasks`` and ``env.sightings``
+    name; the latter needs details (:func:`er_gym.envs.info.with_details`).
 
     Args:
         path: the run directory, or a model file with its ``config.yaml`` beside it: ``model.npz``

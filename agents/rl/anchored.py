@@ -23,17 +23,10 @@ from torch import Tensor
 from torch.nn import functional
 
 from agents.rl.config import TrainConfig
-from agents.rl.guidance import Hints, Start
-from agents.rl.hints import SHOWS
+from agents.rl.guidance import Start
 from agents.rl.network import TypeNetwork
 from agents.rl.policy import TypeFeatures, outputs
-from agents.rl.policy_file import (
-    CONFIG,
-    load_network,
-    observed_space,
-    policy_file,
-    untrained_network,
-)
+from agents.rl.policy_file import CONFIG, load_network, policy_file, untrained_network
 from agents.zoo.index import PREFIX, find_model
 
 _NEVER = -1e8
@@ -45,15 +38,14 @@ class AnchoredPPO(MaskablePPO):
 
     Args:
         start: its settings.
-        hints: by which it learns what would have shown a thing; None for none.
 
     Attributes:
         anchor: the network of the start; :meth:`begin_from` sets it, or a checkpoint.
     """
 
-    def __init__(self, *args: Any, start: Start, hints: Hints | None = None, **kwargs: Any) -> None:
+    def __init__(self, *args: Any, start: Start, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self._start, self._hints = start, hints
+        self._start = start
         extractor: Any = self.policy.features_extractor
         self.anchor: TypeFeatures = deepcopy(extractor).requires_grad_(False).eval()
 
@@ -135,35 +127,12 @@ class AnchoredPPO(MaskablePPO):
                 "clip_fraction": ((ratio - 1).abs() > clip).float().mean().item(),
                 "kl": far.item(),
             }
-        loss = loss + weight * far
-        if self._hints is not None:
-            missed = surprise(distribution.distribution.logits, legal)
-            loss = loss + self._hints.weight * missed.sum() / len(missed)
-            told = (legal == SHOWS).any(dim=1)
-            figures["hints"] = told.float().mean().item()
-            figures["hint_loss"] = missed.sum().item() / max(1, int(told.sum()))
-        return loss, figures
+        return loss + weight * far, figures
 
     def _anchor_logits(self, obs: Any) -> Tensor:
         with torch.no_grad():
             features: Any = self.policy.extract_features(obs, self.anchor)
             return self.policy.mlp_extractor.forward_actor(features)
-
-
-def surprise(logits: Tensor, told: Tensor) -> Tensor:
-    """-log of the probability of the actions that would show a thing.
-
-    Args:
-        logits: (B, A).
-        told: (B, A), 0 for illegal actions, and :data:`~agents.rl.hints.SHOWS` for those.
-
-    Returns:
-        (B,) nats, 0 or more; 0 in rows that tell of none.
-    """
-    legal = logits.masked_fill(told == 0, _NEVER).log_softmax(dim=1)
-    shown = told == SHOWS
-    likely = legal.masked_fill(~shown, _NEVER).logsumexp(dim=1)
-    return torch.where(shown.any(dim=1), -likely, torch.zeros_like(likely))
 
 
 def divergence(start: Tensor, now: Tensor, legal: Tensor) -> Tensor:
@@ -184,8 +153,7 @@ def divergence(start: Tensor, now: Tensor, legal: Tensor) -> Tensor:
 def starting_network(config: TrainConfig, start: Start) -> TypeNetwork:
     """The network of the policy that a run starts from.
 
-    Where the run observes sightings or a map and the policy did not, it does not look at them at
-    first.
+    Where the run observes sightings and the policy did not, it does not look at them at first.
 
     Raises:
         ValueError: there is no such policy, it cannot be read, or it is another network than the
@@ -199,14 +167,15 @@ def starting_network(config: TrainConfig, start: Start) -> TypeNetwork:
     except ValueError as error:
         raise ValueError(f"start.policy {name}: {error}") from error
     mine = untrained_network(config)
-    network.observe_more(observed_space(config))
+    if config.env.sightings:
+        network.add_sightings()
     theirs, wanted = network.state_dict(), mine.state_dict()
     if {key: each.shape for key, each in theirs.items()} != {
         key: each.shape for key, each in wanted.items()
     }:
         raise ValueError(
             f"start.policy {name} observes something else than this run, or its network has "
-            "another shape: take env (obs_mode, subtasks, sightings, object_map, instruction) and "
-            f"network from {file.parent / CONFIG}"
+            "another shape: take env (obs_mode, subtasks, sightings, instruction) and network "
+            f"from {file.parent / CONFIG}"
         )
     return network

@@ -257,8 +257,7 @@ class Curriculum(BetweenRollouts):
 class SuccessByType(BaseCallback):
     """Logs the success rate of each task type over its last ``over`` episodes.
 
-    Episodes that started elsewhere than at their beginning are left out: they are easier or
-    harder.
+    Episodes that started near their goal are left out: they are easier.
     """
 
     def __init__(self, over: int = 100) -> None:

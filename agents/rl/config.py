@@ -14,17 +14,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from agents.configs import ConfigKind, StrictSettings, load
-from agents.rl.guidance import (
-    Fraction,
-    Hints,
-    LongSearches,
-    NearGoal,
-    Phase,
-    Positive,
-    Rate,
-    Start,
-    WarmStart,
-)
+from agents.rl.guidance import Fraction, NearGoal, Phase, Positive, Rate, Start, WarmStart
 from er_gym.envs.object_selection import EXPLORE
 from er_gym.tasks.types import canonical_names
 
@@ -44,12 +34,10 @@ class EnvConfig(StrictSettings):
         sightings: whether it also observes where the things of the subtask were seen, also from
             afar, and how many objects of each type (:mod:`agents.rl.sighting_memory`); with
             ``subtasks``.
-        object_map: whether it also observes where the objects are that it has seen, which of them
-            it has been to, and from where it has looked (:mod:`agents.rl.object_map`); with
-            ``sightings``.
-        ends_when_done: whether it may ``end`` only once it has done all subtasks, as far as it
-            knows, or at the last step; with ``subtasks``. A policy that gives up does not learn
-            what else it could have tried.
+        only_from_source: whether it picks up a thing only from where the instruction says that it
+            lies, as far as it sees: "the Vase that is on the SideTable" is not the one on the
+            CoffeeTable. With ``instances="explore"`` to pick up takes the nearest one; while that
+            lies elsewhere, the policy cannot. With ``sightings``.
         instruction: the encoder of the instruction, as
             :func:`er_gym.envs.wrappers.make_encoder` has it; "" for none, since ``state`` says
             which types it names.
@@ -73,8 +61,7 @@ class EnvConfig(StrictSettings):
     obs_mode: Literal["state", "rgb+state", "depth+state", "rgb+depth+state"] = "state"
     subtasks: bool = False
     sightings: bool = False
-    object_map: bool = False
-    ends_when_done: bool = False
+    only_from_source: bool = False
     instruction: str = ""
     width: Annotated[int, Field(gt=0, le=2048)] = 128
     height: Annotated[int, Field(gt=0, le=2048)] = 72
@@ -92,15 +79,18 @@ class EnvConfig(StrictSettings):
     _types = field_validator("types")(canonical_names)
 
     @model_validator(mode="after")
-    def _each_adds_to_another(self) -> EnvConfig:
+    def _each_needs_another(self) -> EnvConfig:
         if self.sightings and not self.subtasks:
             raise ValueError(
                 "sightings are of the things of the subtask at hand: give subtasks=true, too"
             )
-        if self.object_map and not self.sightings:
-            raise ValueError("object_map adds to sightings: give sightings=true, too")
-        if self.ends_when_done and not self.subtasks:
-            raise ValueError("ends_when_done is about subtasks: give subtasks=true, too")
+        if self.only_from_source and not self.sightings:
+            raise ValueError("only_from_source goes by sightings: give sightings=true, too")
+        if self.only_from_source and self.instances != EXPLORE:
+            raise ValueError(
+                f"only_from_source is for instances={EXPLORE}: with {self.instances} the "
+                "environment picks up what the task means"
+            )
         return self
 
     @property
@@ -191,10 +181,6 @@ class TrainConfig(StrictSettings):
         env, vec, evaluation, network: see their classes.
         curriculum: phases in order; ``env.types`` follow after the last.
         near_goal: a curriculum of the key actions that are left at the start; None for none.
-        long_searches: where the policy's own episodes go on; None for none. They need
-            ``env.subtasks``.
-        hints: by which the policy learns what would have shown a thing; None for none. They need
-            ``start`` and ``env.subtasks``.
         warm_start: behaviour cloning; None for none.
         start: a trained policy to go on from, in place of a warm start; None for none.
         checkpoint_every: steps between two checkpoints; a checkpoint is written after the rollout.
@@ -212,8 +198,6 @@ class TrainConfig(StrictSettings):
     evaluation: Evaluation | None = Evaluation()
     curriculum: tuple[Phase, ...] = ()
     near_goal: NearGoal | None = None
-    long_searches: LongSearches | None = None
-    hints: Hints | None = None
     warm_start: WarmStart | None = None
     start: Start | None = None
     network: Network = Network()
@@ -243,15 +227,6 @@ class TrainConfig(StrictSettings):
                 raise ValueError(
                     f"{name} goes with ppo, not with {self.algorithm.name}: leave one out"
                 )
-        return self
-
-    @model_validator(mode="after")
-    def _searches_are_of_subtasks(self) -> TrainConfig:
-        for name in ("long_searches", "hints"):
-            if getattr(self, name) is not None and not self.env.subtasks:
-                raise ValueError(f"{name} are of subtasks: give env.subtasks=true, too")
-        if self.hints is not None and self.start is None:
-            raise ValueError("hints are for a policy that knows how to search: give start, too")
         return self
 
     @model_validator(mode="after")
@@ -306,9 +281,8 @@ def how_learnt(config: TrainConfig, steps: int) -> str:
         parts.append(f"the weights of {config.start.policy}")
     if steps or not parts:
         parts.append(f"{steps:,} steps of {ALGORITHM_NAMES[config.algorithm.name]}")
-    env = config.env
-    more = (("subtask", env.subtasks), ("sightings", env.sightings), ("map", env.object_map))
-    observed = " and ".join([env.obs_mode, *(name for name, given in more if given)])
+    more = (("subtask", config.env.subtasks), ("sightings", config.env.sightings))
+    observed = " and ".join([config.env.obs_mode, *(name for name, given in more if given)])
     return f"{', then '.join(parts)} on {observed}"
 
 

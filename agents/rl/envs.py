@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import Any, cast
 
 import gymnasium
@@ -15,10 +13,7 @@ from numpy.typing import NDArray
 from agents.rl.adviser import Adviser
 from agents.rl.config import EnvConfig
 from agents.rl.demonstrations import Demonstrations, demonstrate
-from agents.rl.guidance import Hints, LongSearches
-from agents.rl.hints import HintFinder
 from agents.rl.near_goal import (
-    LONG_SEARCH,
     MOMENT,
     Moment,
     StartsWithin,
@@ -81,8 +76,7 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
     """Draws tasks of the given types, and returns what :class:`PolicyObservation` makes of them.
 
     ``info["started_at"]`` is the position at which the episode started near its goal, 0 for an
-    episode from the beginning, and :data:`~agents.rl.near_goal.LONG_SEARCH` for one that goes on
-    from a long search.
+    episode from the beginning.
 
     Args:
         env: an ``EmbodiedEnv``, shaped or not.
@@ -91,9 +85,6 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         policy_observation: makes the learner's observations.
         options: whose demonstrations are used.
         near: the share of episodes that start near the goal, of types with a position.
-        long: when an episode goes on from where an earlier one had searched for long; None for
-            never.
-        hints: finds out which actions would show a thing; None for none.
     """
 
     looks_after_step = True
@@ -106,21 +97,15 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         policy_observation: PolicyObservation,
         options: EnvConfig,
         near: float = 0.0,
-        long: LongSearches | None = None,
-        hints: HintFinder | None = None,
     ) -> None:
         super().__init__(env)
-        self._hints = hints
         self._mask: NDArray[np.int8] | None = None
-        self._long = long
-        self._searches = deque[Moment](maxlen=0 if long is None else long.kept)
         self._near, self._positions = near, dict[str, int]()
         self._started_at = 0
         self._demonstrations = demonstrations_of(options)
         self._source, self.policy_observation = source, policy_observation
         self.set_types(types)
         self._rng = np.random.default_rng()
-        self._hint_rng = np.random.default_rng()  # its own, so that hints change no episode
         self.observation_space = policy_observation.space
 
     def set_types(self, types: Sequence[str]) -> None:
@@ -142,14 +127,11 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         """Begin an episode; its task is drawn unless ``options`` name it, or a moment."""
         if seed is not None:
             self._rng = np.random.default_rng(seed)
-            self._hint_rng = np.random.default_rng([seed, 1])
         chosen = options or self._next()
         obs, info = self.env.reset(seed=seed, options=chosen)
         moment: Moment | None = chosen.get(MOMENT)
         position = 0 if moment is None else moment.left
-        if position > 0:
-            position = self._positions.get(info["task_type"], position)
-        self._started_at = position
+        self._started_at = position and self._positions.get(info["task_type"], position)
         info |= {"seen": obs, "started_at": self._started_at}
         observation = self.policy_observation
         told = observation.info_of(self, info)
@@ -161,9 +143,7 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
         return seen, self._with_choice(info)
 
     def _next(self) -> dict[str, Any]:
-        """The options of the next episode: its task, or where it starts."""
-        if self._long is not None and self._searches and self._rng.random() < self._long.share:
-            return {MOMENT: self._searches[int(self._rng.integers(len(self._searches)))]}
+        """The options of the next episode: its task, or where it starts near its goal."""
         kind = self._types[int(self._rng.integers(len(self._types)))]
         task = self._source.draw(self._rng, kind, None)
         position = self._positions.get(task.type.name)
@@ -178,38 +158,18 @@ class LearningEnv(gymnasium.Wrapper[dict[str, Any], Any, Any, Any]):
 
     def step(self, action: Any) -> tuple[Obs, Any, bool, bool, dict[str, Any]]:
         """Do an action."""
-        observation = self.policy_observation
-        memory = observation.memory() if self._searched(1) and not self._started_at else None
         obs, reward, terminated, truncated, info = self.env.step(action)
         info |= {"seen": obs, "started_at": self._started_at}
-        seen = observation.observe(obs, observation.info_of(self, info))
-        if memory is not None and self._searched() and not (terminated or truncated):
-            own: Any = self.unwrapped
-            self._searches.append(Moment(LONG_SEARCH, own.snapshot(), memory))
+        seen = self.policy_observation.observe(obs, self.policy_observation.info_of(self, info))
         return seen, reward, terminated, truncated, self._with_choice(info)
-
-    def _searched(self, more: int = 0) -> bool:
-        """Whether so many more steps make a long search."""
-        if self._long is None:
-            return False
-        assert self.policy_observation.subtasks is not None  # the configuration sees to it
-        return self.policy_observation.subtasks.since == self._long.after - more
 
     def _with_choice(self, info: dict[str, Any]) -> dict[str, Any]:
         """``info`` whose mask has the actions between which the learner chooses."""
-        mask = self.policy_observation.allowed(info)
-        if self._hints is not None:
-            memory, own = self.policy_observation.subtasks, cast(Any, self.unwrapped)
-            assert memory is not None  # the configuration sees to it
-            kind = self._hints.wanted(memory, info, self._hint_rng.random())
-            if kind is not None:
-                mask = self._hints.showing(own.snapshot(), mask, kind)
-        self._mask = info["action_mask"] = mask
+        self._mask = info["action_mask"] = self.policy_observation.allowed(info)
         return info
 
     def action_masks(self) -> NDArray[np.int8]:
-        """(A,) int8, not 0 for the legal actions between which the learner chooses now, and with
-        hints :data:`~agents.rl.hints.SHOWS` for those that would show the thing.
+        """(A,) int8, not 0 for the legal actions between which the learner chooses now.
 
         Raises:
             ResetNeeded: no episode has begun.
@@ -271,8 +231,6 @@ def make_env(
     with_text: bool = False,
     advised: bool = False,
     near: float = 0.0,
-    long: LongSearches | None = None,
-    hints: Hints | None = None,
     share: tuple[int, int] = (0, 1),
 ) -> gymnasium.Env[Obs, Any]:
     """Make a training environment.
@@ -284,15 +242,24 @@ def make_env(
         with_text: whether ``info["seen"]``, the environment's own observation, holds text, which
             scripted agents need.
         advised: whether the observation holds the searcher's advice; for options with subtasks.
-        near, long: which episodes start elsewhere than at their beginning (:class:`LearningEnv`).
-        hints: in which states the masks tell what would show a thing.
+        near: the share of episodes that start near their goal (:class:`LearningEnv`).
         share: ``(index, count)`` of the worker process; each plays in its own rooms.
 
     Raises:
         ValueError: the suite, the encoder or the reward wrapper does not exist.
         TaskFileError: the suite has not been built, or its file is damaged. (It is a ValueError.)
     """
-    member = _member(options, f"{options.needed_obs_mode}{'+text' * with_text}")
+    member = MemberEnv(
+        (),
+        obs_mode=f"{options.needed_obs_mode}+text" if with_text else options.needed_obs_mode,
+        width=options.width,
+        height=options.height,
+        instances=options.instances,
+        step_penalty=options.step_penalty,
+        illegal_penalty=options.illegal_penalty,
+        faults=options.faults,
+        max_steps=options.max_steps,
+    )
     env: gymnasium.Env[Any, Any] = TrainingRules(
         StartsWithin(member), options.success_bonus, options.key_actions
     )
@@ -303,29 +270,8 @@ def make_env(
     if isinstance(source, TaskList):
         source = source.share(*share)
     observation = PolicyObservation(options, with_mask)
-    finder = None if hints is None else _finder(hints, options)
-    learning = LearningEnv(env, source, options.types, observation, options, near, long, finder)
+    learning = LearningEnv(env, source, options.types, observation, options, near)
     return AdvisedEnv(learning) if advised else learning
-
-
-def _member(options: EnvConfig, obs_mode: str) -> MemberEnv:
-    return MemberEnv(
-        (),
-        obs_mode=obs_mode,
-        width=options.width,
-        height=options.height,
-        instances=options.instances,
-        step_penalty=options.step_penalty,
-        illegal_penalty=options.illegal_penalty,
-        faults=options.faults,
-        max_steps=options.max_steps,
-    )
-
-
-@lru_cache(maxsize=1)
-def _finder(hints: Hints, options: EnvConfig) -> HintFinder:
-    """That of this process, shared by its environments."""
-    return HintFinder(hints, _member(options, "state"))
 
 
 def evaluation_config(options: EnvConfig, episodes: str) -> EnvConfig:

@@ -91,40 +91,6 @@ class Phase(StrictSettings):
     _types = field_validator("types")(canonical_names)
 
 
-class LongSearches(StrictSettings):
-    """Episodes that start where an episode of the policy itself has been at one subtask for long.
-
-    A good policy seldom comes into such states, and when it fails it has mostly been in one. They
-    are kept whatever came of them, so in each the policy meets what it would meet in play.
-
-    Attributes:
-        share: of all episodes that start so, once there are such states.
-        after: the steps since the subtask began.
-        kept: so many states for each environment, the latest.
-    """
-
-    share: Fraction = 0.5
-    after: Positive = 10
-    kept: Positive = 16
-
-
-class Hints(StrictSettings):
-    """What would have shown the thing that the policy looks for: in some states of long searches,
-    in which it has not been seen clearly, the actions that may show it are tried, by branching, and
-    those that do become likelier (:mod:`agents.rl.hints`).
-
-    Attributes:
-        weight: in the loss, of -log of the probability of the actions that show it. The mean is
-            over all steps, those without a hint included, so more hints have more weight together.
-        after: the steps since the subtask began.
-        share: of such states, in which it is tried.
-    """
-
-    weight: float = Field(2.0, ge=0)
-    after: Positive = 6
-    share: Fraction = 0.05
-
-
 class NearGoal(StrictSettings):
     """A curriculum of the way that is left: episodes start within demonstrations of the searcher,
     first near the goal, then farther from it (:mod:`agents.rl.near_goal`).

@@ -29,16 +29,14 @@ _MOST = 1024
 """The number of tasks whose demonstrations a process keeps; one takes some 30 kB."""
 MOMENT = "moment"
 """The option of ``reset`` that names where to start."""
-LONG_SEARCH = -1
-"""The position of an episode that goes on from a long search."""
 
 
 @dataclass(frozen=True)
 class Moment:
-    """A state of a demonstration, or of the learner's own episode.
+    """A state of a demonstration.
 
     Attributes:
-        left: the number of key actions that are left; :data:`LONG_SEARCH` in the learner's own.
+        left: the number of key actions that are left.
         snapshot: of the environment.
         memory: what the learner's observation remembered before it saw this state.
     """

@@ -7,8 +7,7 @@ with the type's embedding and AI2-THOR properties, its fit to the types that the
 and a summary of all other types. The output is one number for each verb with that type.
 
 The observation ``subtask`` adds features to the rows and to the summary, and types that matter in
-more roles: those of the subtask at hand and of the next. ``sightings`` and ``object_map`` add
-features to the rows.
+more roles: those of the subtask at hand and of the next. ``sightings`` adds features to the rows.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from gymnasium import spaces
 from torch import Tensor, nn
 from torch.nn import functional
 
-from agents.rl.object_map import MAP_FEATURES
 from agents.rl.policy_observation import IMAGES
 from agents.rl.sighting_memory import SIGHTING_FEATURES
 from agents.rl.subtask_memory import ROLES, SUBTASK_FEATURES, SUBTASK_SCALARS
@@ -37,10 +35,7 @@ _PROPERTIES = tuple(
 _MATTERS = [FEATURES.index(name) for name in ("navigable", "interactable", "held", "goal")]
 _GOAL = FEATURES.index("goal")
 _ROLES = [SUBTASK_FEATURES.index(name) for name in ROLES]
-_MORE = {"sightings": len(SIGHTING_FEATURES), "object_map": len(MAP_FEATURES)}
-"""The observations that add features to the rows of types, and how many, in the order in which the
-network takes them."""
-_TABLES = ("state", "subtask", *_MORE)
+_TABLES = ("state", "subtask", "sightings")
 """The observations that are scalars, if any, and a table of types."""
 _MANY = 8
 """The approximate number of processed types, for scaling sums."""
@@ -52,9 +47,9 @@ class TypeNetwork(nn.Module):
     """Outputs numbers for every action, and a summary for a value head.
 
     Args:
-        space: with a key ``state``; optionally ``subtask``, ``sightings``, ``object_map``,
-            ``instruction`` (E,), and ``rgb`` and ``depth`` (channels, H, W), as Stable-Baselines3
-            turns pictures; a ``mask`` is not looked at.
+        space: with a key ``state``; optionally ``subtask``, ``sightings``, ``instruction`` (E,),
+            and ``rgb`` and ``depth`` (channels, H, W), as Stable-Baselines3 turns pictures; a
+            ``mask`` is not looked at.
         width: of the layers.
         kind: length of the learnt vector of a type.
         outputs: numbers per action: 1 for a logit or a value, more for quantiles.
@@ -88,9 +83,9 @@ class TypeNetwork(nn.Module):
         }
         self._subtasks = "subtask" in space.spaces
         roles = 2 + len(ROLES) * self._subtasks
-        self._more = [key for key in _MORE if key in space.spaces]
+        self._sightings = "sightings" in space.spaces
         features = len(FEATURES) + len(SUBTASK_FEATURES) * self._subtasks
-        self._features = features + sum(_MORE[key] for key in self._more)
+        self._features = features + len(SIGHTING_FEATURES) * self._sightings
         scalars = len(SCALARS) + len(SUBTASK_SCALARS) * self._subtasks
         self._images = [key for key in extras if key in IMAGES]
         self._told = [key for key in extras if key not in IMAGES]
@@ -111,17 +106,17 @@ class TypeNetwork(nn.Module):
         bare = [INDEX[Action(verb)] for verb in verbs.BARE_VERBS]
         self.register_buffer("bare_index", torch.tensor(bare), persistent=False)
 
-    def observe_more(self, space: spaces.Dict) -> None:
-        """Take what else a space has of ``sightings`` and ``object_map`` from now on, and do the
-        same as before until it learns; what it takes already stays."""
-        for key, features in _MORE.items():
-            if key in space.spaces and key not in self._more:
-                before, fit = self.row.weight.split([self._features, self.kinds.shape[1]], dim=1)
-                new = before.new_zeros(self.width, features)
-                self.row.weight = nn.Parameter(torch.cat([before, new, fit], dim=1).detach())
-                self.row.in_features += features
-                self._features += features
-                self._more.append(key)
+    def add_sightings(self) -> None:
+        """Take ``sightings``, too, from now on, and do the same as before until it learns; nothing
+        changes if it takes them already."""
+        if self._sightings:
+            return
+        features, fit = self.row.weight.split([self._features, self.kinds.shape[1]], dim=1)
+        new = features.new_zeros(self.width, len(SIGHTING_FEATURES))
+        self.row.weight = nn.Parameter(torch.cat([features, new, fit], dim=1).detach())
+        self.row.in_features += len(SIGHTING_FEATURES)
+        self._features += len(SIGHTING_FEATURES)
+        self._sightings = True
 
     def forward(self, obs: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
         """(B, A, outputs) for the actions, 0 for those that cannot be legal; (B, summary_width)."""
@@ -138,9 +133,9 @@ class TypeNetwork(nn.Module):
             matters = matters | (in_role > 0).any(dim=1)
             weights = torch.cat([weights, in_role.transpose(1, 2)], dim=2)
             scalars, table = torch.cat([scalars, more], dim=1), torch.cat([table, rows], dim=1)
-        if self._more:
-            rows_of = [_split(obs[key], 0, _MORE[key])[1] for key in self._more]
-            table = torch.cat([table, *rows_of], dim=1)
+        if self._sightings:
+            _, rows = _split(obs["sightings"], 0, len(SIGHTING_FEATURES))
+            table = torch.cat([table, rows], dim=1)
         at, which = matters.nonzero(as_tuple=True)  # (M,), (M,)
         kinds = torch.cat([self.kinds, self.properties], dim=1)  # (T, K)
         wanted = (weights.transpose(1, 2) @ kinds).flatten(1)  # (B, R K)

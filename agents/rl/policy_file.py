@@ -189,13 +189,8 @@ def _read_safetensors(
 def untrained_network(config: TrainConfig) -> TypeNetwork:
     """The network of a run before it has learnt anything."""
     outputs = config.algorithm.quantiles if config.algorithm.name == "qrdqn" else 1
-    space = observed_space(config)
+    space = channels_first(PolicyObservation(config.env).space)
     return TypeNetwork(space, **config.network.model_dump(), outputs=outputs)
-
-
-def observed_space(config: TrainConfig) -> spaces.Dict:
-    """What the network of a run observes."""
-    return channels_first(PolicyObservation(config.env).space)
 
 
 def channels_first(space: spaces.Dict) -> spaces.Dict:

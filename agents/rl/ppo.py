@@ -18,7 +18,7 @@ def make(config: TrainConfig, settings: PPO, env: VecEnv) -> MaskablePPO:
     """Make an untrained learner: proximal policy optimisation over the legal actions."""
     rate, start = settings.learning_rate, config.start
     kind: Callable[..., MaskablePPO] = (
-        MaskablePPO if start is None else partial(AnchoredPPO, start=start, hints=config.hints)
+        MaskablePPO if start is None else partial(AnchoredPPO, start=start)
     )
     return kind(
         TypePolicy,

@@ -74,11 +74,10 @@ _MOST = 20
 """Counts are the same from here on."""
 _LONGEST = 36
 _INDICES = np.stack([INDICES[verb] for verb in verbs.OBJECT_VERBS])  # (V, T)
-FITS = {
+_FITS = {
     thing: np.array([KIND_OF[place] for place in places if place in KIND_OF], np.intp)
     for thing, places in placement_table().items()
 }
-"""By type of thing, the types on or in which AI2-THOR allows to put it."""
 
 
 def _logarithm(count: int) -> float:
@@ -103,7 +102,6 @@ class SubtaskMemory:
         progress: which subtask is at hand.
         tried: (T,) how often the agent has navigated to each type since the subtask began.
         observed: how often it has observed since then.
-        since: the steps since then.
         moved_on: whether the last action completed a subtask.
     """
 
@@ -123,7 +121,7 @@ class SubtaskMemory:
         self._sights: set[tuple[int, object]] = set()
         self._at: int | None = None
         self.moved_on = False
-        self.since = self.observed = self._observed_ever = 0
+        self._since = self.observed = self._observed_ever = 0
 
     def update(self, info: Mapping[str, Any]) -> NDArray[np.float32]:
         """Take in a step.
@@ -136,14 +134,14 @@ class SubtaskMemory:
         """
         action = action_of(info) if info["action_success"] else None
         reach = frozenset(names(info["interactable_mask"]))
-        self.since += 1
+        self._since += 1
         if action is not None:
             self._remember(action, info)
         if self._at is not None:
             self._seen_at[self._at, info["visible_mask"] > 0] = True
         self.moved_on = self.progress.update(action, info["held"], reach)
         if self.moved_on:
-            self.since = self.observed = 0
+            self._since = self.observed = 0
             self.tried[:] = 0
             self._opened_before |= self._opened_now
             self._opened_now[:] = False
@@ -183,7 +181,7 @@ class SubtaskMemory:
             ("all done", float(now is None)),
             ("left", min(left / 8, 1.0)),
             ("moved on", float(self.moved_on)),
-            ("since", _logarithm(self.since)),
+            ("since", _logarithm(self._since)),
             ("observed", min(self.observed / 3, 1.0)),
             ("observed ever", float(self._observed_ever)),
             ("steps left", min(max(info["max_steps"] - info["steps"], 0) / _LONGEST, 1.0)),
@@ -211,8 +209,8 @@ class SubtaskMemory:
                 table[_ROW[f"{role} seen there"]] = self._seen_at[:, kind]
         if now.source in KIND_OF:
             table[_ROW["source"], KIND_OF[now.source]] = 1.0
-        if now.thing in FITS:
-            table[_ROW["fits"], FITS[now.thing]] = 1.0
+        if now.thing in _FITS:
+            table[_ROW["fits"], _FITS[now.thing]] = 1.0
         marked = {thing, place}
         roles = ("next thing", "next place")
         for ahead in range(1, _AHEAD):

@@ -47,11 +47,6 @@ class Subtask:
         return {verbs.PUT: self.thing, verbs.SLICE: self.place}.get(self.verb, "")
 
     @property
-    def sought(self) -> str:
-        """The type that must be found: for ``put in`` that of the receptacle."""
-        return self.place if self.verb == verbs.PUT else self.thing
-
-    @property
     def action(self) -> Action | None:
         """The action that completes it; None for ``find``."""
         if self.verb == FIND:
@@ -113,11 +108,12 @@ class Progress:
     Attributes:
         subtasks: all of them, in order.
         number: the index of the one at hand; ``len(subtasks)`` once all are done.
+        furthest: the highest that it has been: one before it has been done, and may come again.
     """
 
     def __init__(self, instruction: str) -> None:
         self.subtasks = subtasks(instruction)
-        self.number = 0
+        self.number = self.furthest = 0
 
     def at(self, ahead: int = 0) -> Subtask | None:
         """The subtask at hand, or one of those after it; None beyond the last."""
@@ -138,6 +134,7 @@ class Progress:
             self.number += 1
         while (now := self.at()) is not None and _fulfilled(now, held, reach):
             self.number += 1
+        self.furthest = max(self.furthest, self.number)
         while (now := self.at()) is not None and now.tool and held != now.tool:
             earlier = self._pickup_before(now.tool)
             if earlier is None:

@@ -136,8 +136,7 @@ def _train(
     seed = int(np.random.SeedSequence([config.seed, steps]).generate_state(1)[0])
     begin(f"starting {config.vec.envs} environments in {config.vec.workers} workers")
     near = 0.0 if config.near_goal is None else config.near_goal.share
-    make = partial(make_env, near=near, long=config.long_searches, hints=config.hints)
-    env = make_vec_env(config, config.env, seed, make)
+    env = make_vec_env(config, config.env, seed, near)
     checkpoints = Checkpoints(run, config.checkpoint_every)
     callbacks = [checkpoints, TorchThreads(config.threads), SuccessByType(), *more]
     held_out = None
@@ -237,19 +236,15 @@ def load_last_checkpoint(run: Path) -> BaseAlgorithm | None:
     return model
 
 
-def make_vec_env(
-    config: TrainConfig, options: EnvConfig, seed: int, make: Callable[..., Any] = make_env
-) -> VecEnv:
+def make_vec_env(config: TrainConfig, options: EnvConfig, seed: int, near: float = 0.0) -> VecEnv:
     """Make ``config.vec.envs`` environments in worker processes with consecutive seeds.
 
-    Each process plays in its share of the rooms.
-
-    Args:
-        make: :func:`agents.rl.envs.make_env`, and what of its arguments is for training alone.
+    Each process plays in its share of the rooms, and starts the share ``near`` of its episodes near
+    their goals.
     """
     needs_mask = LEARNERS[config.algorithm.name].needs_mask
-    one = partial(make, options, config.algorithm.gamma, needs_mask)
-    env = VecMonitor(WorkerVecEnv([one] * config.vec.envs, config.vec.workers))
+    make = partial(make_env, options, config.algorithm.gamma, needs_mask, near=near)
+    env = VecMonitor(WorkerVecEnv([make] * config.vec.envs, config.vec.workers))
     env.seed(seed)
     return env
 

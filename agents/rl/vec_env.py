@@ -86,8 +86,7 @@ class WorkerVecEnv(VecEnv):
         return obs, rewards, dones, [info for batch in batches for info in batch.infos]
 
     def action_masks(self) -> NDArray[np.int8]:
-        """(n, A) int8, not 0 for the actions to choose from, as they came with the last
-        observations."""
+        """(n, A) int8: the legal actions, as they came with the last observations."""
         return self._masks
 
     def env_method(

@@ -31,8 +31,7 @@ class StepBatch(NamedTuple):
         obs: by the observation's keys, (k, …); after the end of an episode, the first of the next.
         rewards: (k,) float32.
         dones: (k,) bool.
-        masks: (k, A) int8, not 0 for the actions to choose from now, as
-            :meth:`agents.rl.envs.LearningEnv.action_masks` has them.
+        masks: (k, A) int8, the actions that are legal now.
         infos: k small dictionaries: of an episode that has ended its ``is_success``, ``task_type``,
             ``end_reason``, ``started_at`` and ``terminal_observation``, otherwise empty.
     """

@@ -32,7 +32,7 @@ _OWN = {
     "random": (REFERENCE, "legal actions at random"),
     "oracle": (REFERENCE, "knows the key actions of each task"),
     "searcher": (SCRIPT, "reads the instruction, and looks where such things usually are"),
-    "spotter": (SCRIPT, "the searcher, which also goes to where it sees a thing from afar"),
+    "spotter": (SCRIPT, "the searcher, which also goes by where it sees things from afar"),
     "mask-reader": (SCRIPT, "reads the instruction and the lists of legal actions"),
     HUMAN: (PERSON, "played by hand"),
 }

@@ -144,10 +144,10 @@ class RunReport:
 
 @dataclass(frozen=True)
 class BetweenArrangements:
-    """Success with the interval that other arrangements of rooms would give.
+    """Success with the interval that other arrangements of the same rooms would give.
 
-    Tasks of one arrangement fail together where it hides a thing well, so this interval is wider
-    than one that counts tasks as independent.
+    Tasks of one arrangement fail together where it hides a thing well, so this interval is usually
+    wider than one that counts tasks as independent.
 
     Attributes:
         arrangements: how many different ones were played.
@@ -162,14 +162,14 @@ class BetweenArrangements:
 def between_arrangements(
     episodes: Sequence[EpisodeRecord], scores: Sequence[Score]
 ) -> BetweenArrangements | None:
-    """Success by arrangement; None if no two tasks share one.
+    """Success by arrangement; None if no two tasks share one, or all do.
 
     Args:
         episodes, scores: (n,) what was played, and what it scored.
     """
     where = [arrangement_of(episode.scene, episode.task_id) for episode in episodes]
     different = len(set(where))
-    if different == len({each.task_id for each in scores}):
+    if different < 2 or different == len({each.task_id for each in scores}):
         return None
     return BetweenArrangements(different, success_rate(where, [each.success for each in scores]))
 

@@ -68,15 +68,18 @@ def variance_between(tasks: Sequence[str], values: Sequence[float]) -> float | N
 def effective_number(tasks: Sequence[str], successes: Sequence[bool]) -> float:
     """The effective sample size: how many episodes of different tasks give as narrow an interval.
 
-    It lies between the number of tasks, if all episodes of a task come out alike, and the number
-    of episodes, if they are as different as those of different tasks.
+    It lies between what there is if all episodes of a task come out alike, and the number of
+    episodes, if they are as different as those of different tasks. The former is the number of
+    tasks, and less if some have more episodes than others: n^2 / sum of squares of their numbers
+    of episodes (Kish).
     """
-    n, different = len(successes), len(set(tasks))
+    n = len(successes)
+    least = n**2 / sum(number**2 for number in Counter(tasks).values())
     rate = sum(successes) / n
     variance = variance_between(tasks, successes)
     if not variance or rate in (0.0, 1.0):
-        return float(different)
-    return min(max(rate * (1 - rate) / variance, float(different)), float(n))
+        return least
+    return min(max(rate * (1 - rate) / variance, least), float(n))
 
 
 def pass_at(k: int, n: int, successes: int) -> float:

@@ -38,7 +38,7 @@ _WORDS_WIDTH = 18
 _GAP = 2
 _BY_ARRANGEMENT = "Success, by arrangement"
 _ALIKE = (
-    "By arrangement of the rooms, of which there are n: the interval for a suite with other ones"
+    "By arrangement of the rooms, of which there are n: the interval for other ones of these rooms"
 )
 
 

@@ -101,6 +101,13 @@ def apart(one: ObjectView, other: ObjectView) -> float:
     return sqrt(max(square, 0.0))
 
 
+def lies_elsewhere(object_type: str, place: str, views: Iterable[ObjectView]) -> bool:
+    """Whether objects of a type are in view, and none lies in or on a type of place, as far as the
+    view tells where they lie."""
+    found = [view.on for view in views if view.object_type == object_type]
+    return bool(found) and not {"", place} & {*found}
+
+
 def nearest_to(goal: ObjectView, views: Iterable[ObjectView]) -> tuple[str, ...]:
     """The types of the objects of a view, those nearest to one of its objects first; that one's own
     type is the first."""

@@ -81,7 +81,7 @@ FEATURE_ROW = {feature: row for row, feature in enumerate(FEATURES)}
 FIRST_DID = FEATURE_ROW[_DID[0]]
 """Where the last action, the verbs asked for, the row of each feature and the rows of what was done
 stand in :data:`STATE_LAYOUT`."""
-ROOM_SCALE = 10.0
+_ROOM_SCALE = 10.0
 """The offsets from the start are divided by this many metres."""
 _TEXT_LENGTH = 20_000
 _MOST_OBJECTS = 2**31 - 1
@@ -129,8 +129,8 @@ def _relative_pose(situation: Situation) -> tuple[float, ...]:
     right = dx * cos(heading) - dz * sin(heading)
     ahead = dx * sin(heading) + dz * cos(heading)
     return (
-        right / ROOM_SCALE,
-        ahead / ROOM_SCALE,
+        right / _ROOM_SCALE,
+        ahead / _ROOM_SCALE,
         sin(turned),
         cos(turned),
         pose.horizon / 90.0,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
+from itertools import product
 from typing import Any
 
 import pytest
@@ -251,6 +253,24 @@ def test_of_two_the_spotter_goes_to_the_nearer(env: EmbodiedEnv) -> None:
         second = agent.act(obs, {**info, "object_views": views})
         assert isinstance(second, Decision)
         assert str(second.action) == f"navigate to {one}"
+
+
+def test_the_spotter_takes_what_is_meant() -> None:
+    """The toilet paper that is on the hanger, where there is more of it."""
+    tasks = [task for task in load_suite("er-val").tasks if "-from_" in task.id]
+    right, wrong = Counter[str](), Counter[str]()
+    for instances, name in product(("explore", "target"), ("searcher", "spotter")):
+        with EmbodiedEnv(obs_mode="text+objects", instances=instances) as env:
+            for task in tasks:
+                meant = {action.object_id for action in task.key_actions}
+                steps = play_episode(env, make_agent(name), task, 0).steps
+                took = [step for step in steps if step.verb == verbs.PICKUP and step.success]
+                counts = right if took and took[0].object_id in meant else wrong
+                counts[f"{name}, {instances}"] += 1
+    assert wrong["spotter, explore"] < wrong["searcher, explore"]
+    # There the environment knows which is meant, and nothing must keep the agent from it.
+    assert wrong["spotter, target"] <= wrong["searcher, target"]
+    assert right["spotter, target"] > 10
 
 
 def test_nonsense_ends_at_once(env: EmbodiedEnv) -> None:

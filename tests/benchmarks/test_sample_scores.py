@@ -44,3 +44,5 @@ def test_the_interval_is_that_of_different_tasks() -> None:
     assert effective_number([*"abcde"] * 3, alike * 3) == pytest.approx(5, rel=0.25)
     assert effective_number(["a", "a", "b", "b"], [True, False, True, False]) == 2
     assert effective_number(["a", "a", "b", "b"], [True] * 4) == 2
+    # One task with three episodes of four: they tell less than two tasks do.
+    assert effective_number(["a", "a", "a", "b"], [True] * 4) == pytest.approx(16 / 10)

@@ -18,7 +18,7 @@ from agents.rl.agent import GreedyPolicy, RLAgent
 from agents.rl.anchored import starting_network
 from agents.rl.config import EnvConfig, how_learnt
 from agents.rl.envs import make_env
-from agents.rl.policy_file import MODEL, load_network, observed_space, untrained_network
+from agents.rl.policy_file import MODEL, load_network, untrained_network
 from agents.rl.sighting_memory import SIGHTING_FEATURES, SIGHTING_LAYOUT, SightingMemory
 from agents.rl.subtasks import Progress
 from er_gym.envs.actions import INDEX, Action
@@ -172,7 +172,7 @@ def test_a_policy_begins_to_see(make_config: Any, blind: Path) -> None:
     assert gradient is not None
     fit = config.network.kind
     assert gradient[:, -fit - len(SIGHTING_FEATURES) : -fit].ne(0).any(dim=0).all()
-    network.observe_more(observed_space(config))  # no more than once
+    network.add_sightings()  # no more than once
     assert torch.equal(network(obs)[0], numbers)
     room.close()
 
