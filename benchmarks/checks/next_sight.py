@@ -1,6 +1,6 @@
 """How much a policy's observation tells of where the thing is that it looks for.
 
-    python -m benchmarks.checks.next_sight POLICY [--states 16000] [--without sightings]
+    python -m benchmarks.checks.next_sight POLICY [--states 12000] [--without sightings]
 
 It lets a policy of ``er-gym train-rl`` play tasks of ``train`` and, in some steps of its searches,
 tries by branching what would let it see the thing clearly: each legal action that may show
@@ -66,14 +66,12 @@ class SearchStates(NamedTuple):
         obs: by name, (n, …) float16, what the policy observed.
         worth: (n, A) float32, 1 if the action shows the thing, :data:`SECOND` if another after it
             does, else 0; NaN if it was not tried.
-        legal: (n, A) whether the policy could do it.
         since: (n,) the steps since the search began.
         scene: (n,) the room.
     """
 
     obs: dict[str, NDArray[Any]]
     worth: NDArray[Any]
-    legal: NDArray[Any]
     since: NDArray[Any]
     scene: NDArray[Any]
 
@@ -134,7 +132,7 @@ def gathered(file: Path, options: EnvConfig, count: int, seed: int) -> SearchSta
 
 def _searches(
     network: TypeNetwork, options: EnvConfig, seed: int
-) -> Iterator[tuple[dict[str, NDArray[Any]], Any, Any, int, str]]:
+) -> Iterator[tuple[dict[str, NDArray[Any]], NDArray[Any], int, str]]:
     """The values of :class:`SearchStates`, one step after the other."""
     env: Any = make_env(options)
     trying = EmbodiedEnv(
@@ -154,7 +152,7 @@ def _searches(
         if kind is not None and random.random() < share:
             worth = worth_of(trying, env.unwrapped.snapshot(), legal, kind)
             kept = {key: array.astype(np.float16) for key, array in obs.items()}
-            yield kept, worth, legal > 0, since, env.unwrapped.task.scene
+            yield kept, worth, since, env.unwrapped.task.scene
         seen = {key: torch.as_tensor(array)[None] for key, array in obs.items()}
         with torch.no_grad():
             numbers = _numbers(network, seen)[0].masked_fill(
@@ -256,7 +254,7 @@ def _row(name: str, worth: NDArray[Any], tested: SearchStates, policy: NDArray[A
     return [name, *cells, shown]
 
 
-def _told(policy: str, hidden: Sequence[str]) -> tuple[Path, EnvConfig]:
+def _asked(policy: str, hidden: Sequence[str]) -> tuple[Path, EnvConfig]:
     """The model file of a policy, and what it observes.
 
     Raises:
@@ -284,7 +282,7 @@ def _told(policy: str, hidden: Sequence[str]) -> tuple[Path, EnvConfig]:
 
 @click.command(help=__doc__)
 @click.argument("policy")
-@click.option("--states", "count", default=16_000, show_default=True, type=click.IntRange(20))
+@click.option("--states", "count", default=12_000, show_default=True, type=click.IntRange(20))
 @click.option("--epochs", default=4, show_default=True, type=click.IntRange(1))
 @click.option("--without", "hidden", multiple=True, help="An observation to do without, too.")
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1))
@@ -293,7 +291,7 @@ def main(
     policy: str, count: int, epochs: int, hidden: tuple[str, ...], workers: int, seed: int
 ) -> None:
     try:
-        file, options = _told(policy, hidden)
+        file, options = _asked(policy, hidden)
     except ValueError as error:
         raise click.ClickException(str(error)) from error
     parts = -(-count // _PART)

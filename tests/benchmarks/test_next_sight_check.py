@@ -80,7 +80,6 @@ def test_a_network_learns_it(policy: Path, states: SearchStates) -> None:
     everything = np.arange(len(states.since))
     best = np.nanmax(states.worth, axis=1)
     assert 0.1 < best.mean() < 0.9
-    assert states.legal[~np.isnan(states.worth)].all()
     untaught = worth_of_first(Prediction(load_network(policy)), states, everything)
     assert untaught.mean() < 0.5 * best.mean()
     model = learn(Prediction(load_network(policy)), states, everything, epochs=150)
