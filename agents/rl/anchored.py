@@ -150,6 +150,15 @@ def divergence(start: Tensor, now: Tensor, legal: Tensor) -> Tensor:
     return (one.exp() * (one - other)).sum(dim=1)
 
 
+def policy_folder(name: str) -> Path:
+    """Where a policy is: ``zoo:NAME``, a run directory, or a model file.
+
+    Raises:
+        ValueError: the zoo has no such model.
+    """
+    return find_model(name.removeprefix(PREFIX)).folder if name.startswith(PREFIX) else Path(name)
+
+
 def starting_network(config: TrainConfig, start: Start) -> TypeNetwork:
     """The network of the policy that a run starts from.
 
@@ -160,7 +169,7 @@ def starting_network(config: TrainConfig, start: Start) -> TypeNetwork:
             run's.
     """
     name = start.policy
-    path = find_model(name.removeprefix(PREFIX)).folder if name.startswith(PREFIX) else Path(name)
+    path = policy_folder(name)
     try:
         file = policy_file(path)
         network = load_network(file)

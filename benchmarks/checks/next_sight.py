@@ -30,12 +30,13 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
+from agents.rl.anchored import policy_folder
 from agents.rl.config import EnvConfig, load_config
 from agents.rl.envs import make_env
 from agents.rl.network import TypeNetwork
 from agents.rl.policy_file import CONFIG, load_network, policy_file
 from agents.rl.subtasks import Subtask
-from agents.zoo.index import PREFIX, find_model
+from benchmarks.checks.out_of_sight import LOOKS
 from benchmarks.harness.output import progress
 from benchmarks.scoring.metrics import between
 from benchmarks.scoring.tables import NONE
@@ -47,8 +48,7 @@ from er_gym.thor.objects import KIND_OF
 
 SECOND = 0.6
 """What a sight is worth that takes two actions."""
-_LOOKS = {verbs.NAVIGATE, verbs.OPEN, verbs.CLOSE, verbs.OBSERVE, verbs.MOVE_FORWARD}
-_IS_LOOK = np.array([action.verb in _LOOKS for action in ACTIONS])
+_IS_LOOK = np.array([action.verb in LOOKS for action in ACTIONS])
 _UNCOVERS = np.array([action.verb in (verbs.OPEN, verbs.CLOSE) for action in ACTIONS])
 _SHARE, _EARLY, _EARLY_SHARE = 0.3, 4, 0.12
 """Of the steps of a search that are kept; of its first steps, of which there are more."""
@@ -260,9 +260,7 @@ def _asked(policy: str, hidden: Sequence[str]) -> tuple[Path, EnvConfig]:
     Raises:
         ValueError: there is none, or it cannot be asked.
     """
-    zoo = policy.startswith(PREFIX)
-    folder = find_model(policy.removeprefix(PREFIX)).folder if zoo else Path(policy)
-    file = policy_file(folder)
+    file = policy_file(policy_folder(policy))
     config = load_config(file.parent / CONFIG)
     options = config.env
     if not options.subtasks:

@@ -33,9 +33,10 @@ from er_gym.tables import Table, as_markdown
 from er_gym.tasks import verbs
 from er_gym.tasks.task import Task
 
-_LOOKS = {verbs.NAVIGATE, verbs.OPEN, verbs.CLOSE, verbs.OBSERVE, verbs.MOVE_FORWARD}
+LOOKS = {verbs.NAVIGATE, verbs.OPEN, verbs.CLOSE, verbs.OBSERVE, verbs.MOVE_FORWARD}
+"""The verbs that may show something."""
 _TRIED = sorted(
-    (number for number, action in enumerate(ACTIONS) if action.verb in _LOOKS),
+    (number for number, action in enumerate(ACTIONS) if action.verb in LOOKS),
     key=lambda number: ACTIONS[number].verb != verbs.CLOSE,  # so it is found if closing does it
 )
 NOT_THERE, NEVER, CLOSING = "not there", "more", "closing"

@@ -108,7 +108,7 @@ def test_an_agent_takes_what_is_meant(make_config: Any, tmp_path: Path, only: bo
         over = False
         while not over:
             # The untrained network picks the thing up if it can; until then it is led around.
-            legal = env.unwrapped.action_masks()
+            legal = env.unwrapped.action_masks().copy()
             legal[[number for number in PICKUPS if ACTIONS[number].object_type != thing]] = 0
             info["action_mask"] = legal
             action = agent.act(info["seen"], with_details(env, info)).action
