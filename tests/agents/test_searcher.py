@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from itertools import product
 from typing import Any
 
+import numpy as np
 import pytest
 
 from agents import make_agent
@@ -271,6 +272,26 @@ def test_the_spotter_takes_what_is_meant() -> None:
     # There the environment knows which is meant, and nothing must keep the agent from it.
     assert wrong["spotter, target"] <= wrong["searcher, target"]
     assert right["spotter, target"] > 10
+
+
+def test_the_spotter_takes_again_what_it_has_put_down(env: EmbodiedEnv) -> None:
+    task = next(task for task in load_suite("er-val").tasks if "-from_" in task.id)
+    goal = parse_instruction(task.instruction)[0]
+    obs, told = env.reset(options={"task": task})
+    elsewhere = ObjectView(f"{goal.object_type}|1", goal.object_type, 0.0, 1.0, "Floor")
+    near = {
+        **with_details(env, told),
+        "object_views": (elsewhere,),
+        "action_mask": np.ones_like(told["action_mask"]),
+    }
+    agent: Any = make_agent("spotter")
+    agent.reset(task, obs, near)
+    agent._source = goal.source
+    agent._take_result(near)
+    assert not agent._ready(goal.object_type, verbs.PICKUP)
+    agent._take_result({**near, "held": goal.object_type})
+    agent._take_result(near)
+    assert agent._ready(goal.object_type, verbs.PICKUP)
 
 
 def test_nonsense_ends_at_once(env: EmbodiedEnv) -> None:
